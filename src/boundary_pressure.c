@@ -1,0 +1,85 @@
+// Pressure on the Delaunay boundary, eq (22) [P 2.5, 3.2]: each edge of the loop carries p h times its length along the
+// inward normal, half to each end. On a closed loop that is a force and moment free system of uniform stress p.
+// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest.
+#include "boundary.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// Marks the grains that touch a plate now, or, where none does, nothing.
+static void touching(const tal_sim *sim, int side, unsigned char *mark) {
+  const tal_contacts *s = &sim->wall_contacts;
+  memset(mark, 0, sim->grains.count);
+  for (size_t c = 0; c < s->count; c++)
+    if (s->overlap[c] > 0 && sim->walls.wall[s->j[c]].plate == side) mark[s->i[c]] = 1;
+}
+
+// Loop places of the leftmost and rightmost grain touching the plate; the grain nearest the plate when none touches.
+static void plate_ends(const tal_sim *sim, int side, unsigned char *mark, int64_t *left, int64_t *right) {
+  const geo_loop *loop = &sim->graph.loop;
+  const tal_grains *g = &sim->grains;
+  touching(sim, side, mark);
+  int64_t nearest = 0;
+  *left = *right = -1;
+  for (int64_t k = 0; k < (int64_t)loop->count; k++) {
+    int32_t i = loop->node[k], n = loop->node[nearest];
+    if (side * g->y[i] - g->r[i] < side * g->y[n] - g->r[n]) nearest = k;
+    if (!mark[i]) continue;
+    if (*left < 0 || g->x[i] < g->x[loop->node[*left]]) *left = k;
+    if (*right < 0 || g->x[i] > g->x[loop->node[*right]]) *right = k;
+  }
+  if (*left < 0) *left = *right = nearest;
+}
+
+static void refreshed(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  memset(g->bx, 0, g->count * sizeof *g->bx);
+  memset(g->by, 0, g->count * sizeof *g->by);
+  if (!tal_walls_plate(&sim->walls, +1) || !tal_walls_plate(&sim->walls, -1)) {
+    sim->run.arc_bottom_left = sim->run.arc_bottom_right = sim->run.arc_top_right = sim->run.arc_top_left = 0;
+    return;
+  }
+  unsigned char *mark = tal_alloc(g->count, 1);
+  plate_ends(sim, +1, mark, &sim->run.arc_bottom_left, &sim->run.arc_bottom_right);
+  plate_ends(sim, -1, mark, &sim->run.arc_top_left, &sim->run.arc_top_right);
+  free(mark);
+}
+
+// The given number of edges counter-clockwise from place `from`.
+static void press_arc(tal_sim *sim, int64_t from, size_t edges) {
+  const geo_loop *loop = &sim->graph.loop;
+  tal_grains *g = &sim->grains;
+  const double half = 0.5 * sim->run.pressure * sim->constants.thickness;
+  size_t k = (size_t)from;
+  for (size_t e = 0; e < edges; e++) {
+    size_t next = k + 1 == loop->count ? 0 : k + 1;
+    int32_t a = loop->node[k], b = loop->node[next];
+    // inward normal times length of a counter-clockwise edge
+    double fx = -half * (g->y[b] - g->y[a]), fy = half * (g->x[b] - g->x[a]);
+    g->bx[a] += fx;
+    g->by[a] += fy;
+    g->bx[b] += fx;
+    g->by[b] += fy;
+    k = next;
+  }
+}
+
+static size_t edges_between(const geo_loop *loop, int64_t from, int64_t to) {
+  return (size_t)(to >= from ? to - from : to + (int64_t)loop->count - from);
+}
+
+static void apply(tal_sim *sim) {
+  const geo_loop *loop = &sim->graph.loop;
+  const tal_run *run = &sim->run;
+  tal_grains *g = &sim->grains;
+  for (size_t k = 0; k < loop->count; k++) g->bx[loop->node[k]] = g->by[loop->node[k]] = 0;
+  if (!tal_walls_plate(&sim->walls, +1)) {
+    press_arc(sim, 0, loop->count);
+    return;
+  }
+  press_arc(sim, run->arc_bottom_right, edges_between(loop, run->arc_bottom_right, run->arc_top_right));
+  press_arc(sim, run->arc_top_left, edges_between(loop, run->arc_top_left, run->arc_bottom_left));
+}
+
+const tal_boundary tal_boundary_pressure = {"pressure", "pressure on the grains of the Delaunay boundary", refreshed,
+                                            apply};

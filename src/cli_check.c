@@ -1,0 +1,153 @@
+// talus check SCENE.yaml [--set K=V]...: validates, packs, and prints what the run would be and cost. Writes nothing.
+#include "cli.h"
+
+#include "critical.h"
+#include "effects.h"
+#include "sim.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+static void print_effects(const tal_sim *sim) {
+  static const struct {
+    unsigned bit;
+    const char *name;
+  } names[] = {{TAL_EFFECT_HERTZ, "hertz"},       {TAL_EFFECT_DAMPING, "damping"}, {TAL_EFFECT_REGULARISED, "regularised friction"},
+               {TAL_EFFECT_SPRING, "spring friction"}, {TAL_EFFECT_SPIN, "rotation"},   {TAL_EFFECT_GRAVITY, "gravity"},
+               {TAL_EFFECT_BOUNDARY, "boundary forces"}, {TAL_EFFECT_WALLS, "walls or plates"}, {TAL_EFFECT_HELD, "driven grains"}};
+  printf("effects       ");
+  if (!(sim->effects & TAL_EFFECT_HERTZ)) printf("linear contact");
+  const char *comma = sim->effects & TAL_EFFECT_HERTZ ? "" : ", ";
+  for (size_t k = 0; k < sizeof names / sizeof *names; k++)
+    if (sim->effects & names[k].bit) {
+      printf("%s%s", comma, names[k].name);
+      comma = ", ";
+    }
+  printf("  (first stage)\nkernel        %s, mask %u\n", sim->scene->integrator.scheme, sim->effects & TAL_EFFECT_LAW);
+}
+
+// Bytes of grains and slots as they stand.
+static double memory(const tal_sim *sim) {
+  double grain = 0, slot = 0;
+#define X(type, name, unit, kept, meaning) grain += sizeof(type);
+  TAL_GRAIN_FIELDS(X)
+#undef X
+#define X(type, name, unit, kept, meaning) slot += sizeof(type);
+  TAL_CONTACT_FIELDS(X)
+#undef X
+  const double graph = 2 * (3 + 3) * sizeof(int32_t) + 2 * sizeof(double) + 2; // per grain: two cells, references
+  double incidences = 2.0 * sizeof(int32_t) * (double)sim->neighbours.slot_capacity / 2;
+  return (double)sim->grains.count * (grain + graph) + (double)sim->pairs.capacity * slot + incidences;
+}
+
+static double clock_now(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+// Steps of the scene's stages; a confine stage is taken as twice its ramp.
+static double planned_steps(const tal_scene *scene) {
+  double steps = 0;
+  for (size_t s = 0; s < scene->stage_count; s++) {
+    const tal_scene_stage *stage = &scene->stages[s];
+    double duration = stage->duration > 0 ? stage->duration : 0;
+    if (stage->ramp > 0) duration = 2 * stage->ramp;
+    if (stage->rate > 0) duration = stage->strain / stage->rate;
+    steps += duration / stage->integrator.dt;
+  }
+  return steps;
+}
+
+// Steps per second of this scene here, from a short trial on the packed grains.
+static double measured_rate(tal_sim *sim) {
+  double started = clock_now(), took = 0;
+  int64_t steps = 0;
+  while (took < 0.5 && !tal_sim_done(sim)) {
+    for (int k = 0; k < 20; k++)
+      if (tal_sim_step(sim, NULL)) return steps ? (double)steps / (clock_now() - started) : (double)NAN;
+    steps += 20;
+    took = clock_now() - started;
+  }
+  return took > 0 ? (double)steps / took : (double)NAN;
+}
+
+static double first_pressure(const tal_scene *scene) {
+  for (size_t s = 0; s < scene->stage_count; s++)
+    if (scene->stages[s].pressure > 0) return scene->stages[s].pressure;
+  return NAN;
+}
+
+static double first_rate(const tal_scene *scene) {
+  for (size_t s = 0; s < scene->stage_count; s++)
+    if (scene->stages[s].rate > 0) return scene->stages[s].rate;
+  return NAN;
+}
+
+static double packed_height(const tal_grains *g) {
+  double bottom = INFINITY, top = -INFINITY;
+  for (size_t i = 0; i < g->count; i++) {
+    bottom = fmin(bottom, g->y[i] - g->r[i]);
+    top = fmax(top, g->y[i] + g->r[i]);
+  }
+  return top - bottom;
+}
+
+static void print_numbers(const tal_sim *sim) {
+  const tal_scene *scene = sim->scene;
+  const tal_constants *k = &sim->constants;
+  double height = packed_height(&sim->grains), pressure = first_pressure(scene), rate = first_rate(scene);
+  printf("grains        %zu, mean radius %.5g m, thickness %.5g m, mean mass %.5g kg (scaled by %g)\n",
+         sim->grains.count, k->mean_radius, k->thickness, k->mean_mass, scene->mass_scaling);
+  printf("packing       height %.5g m, solid fraction %.4f, coordination %.3f, largest overlap %.2g m\n", height,
+         sim->packing_solid_fraction, sim->packing_coordination, sim->packing_overlap);
+  if (isfinite(k->vR)) printf("vR            %.5g m/s\n", k->vR);
+  double now = tal_critical_step(sim), confined = tal_critical_step_scene(scene, k, k->mean_mass / 2);
+  printf("dt/dt_crit    %.3g on the packed grains", scene->integrator.dt / now);
+  if (isfinite(confined)) printf(", %.3g for two mean grains under the load of the scene", scene->integrator.dt / confined);
+  printf("\n");
+  double friction = tal_friction_step(sim, pressure);
+  if (isfinite(friction))
+    printf("friction      explicit steps above %.3g s chatter by more than vR; dt is %.3g times that\n", friction,
+           scene->integrator.dt / friction);
+  if (isfinite(rate) && isfinite(pressure))
+    printf("phi, psi      %.4g (quasi-static well below 1), %.4g (size, 2R/L)\n",
+           tal_quasistatic_coefficient(sim, rate, pressure, height), 2 * k->mean_radius / height);
+}
+
+static void print_cost(tal_sim *sim) {
+  double steps = planned_steps(sim->scene), grains = (double)sim->grains.count;
+  printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
+  if (steps == 0) return;
+  double rate = measured_rate(sim);
+  printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps, 1e-6 * rate * grains,
+         steps / rate);
+}
+
+int tal_cli_check(int argc, char **argv) {
+  tal_cli_options options;
+  int exit_code;
+  if (!tal_cli_options_parse(&options, "check", TAL_CLI_SET, "SCENE.yaml", argc, argv, &exit_code)) return exit_code;
+  tal_scene scene;
+  tal_scene_errors errors;
+  tal_error err;
+  tal_sim *sim;
+  if (tal_scene_load(&scene, options.argument, options.sets, options.set_count, &errors)) {
+    tal_cli_options_clear(&options);
+    return tal_cli_print_errors(&errors);
+  }
+  exit_code = tal_sim_create(&sim, &scene, &err);
+  if (exit_code) {
+    fprintf(stderr, "%s%s\n", exit_code == TAL_BAD_INPUT ? "" : "talus: ", err.text);
+  } else {
+    printf("scene         %s: valid\n", options.argument);
+    print_effects(sim);
+    print_numbers(sim);
+    print_cost(sim);
+    tal_sim_free(sim);
+  }
+  tal_scene_clear(&scene);
+  tal_cli_options_clear(&options);
+  return exit_code;
+}

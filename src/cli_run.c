@@ -1,0 +1,84 @@
+// talus run SCENE.yaml [-o DIR] [-t THREADS] [--set K=V]... [--resume] [-q] [--no-figures]
+#include "cli.h"
+
+#include "figures.h"
+#include "run.h"
+
+#include <math.h>
+
+static void print_summary(const tal_run_result *result, const char *dir) {
+  const tal_row *row = &result->row;
+  printf("%s: t = %g s, %.0f steps, %.3g s, %.3g million grain-steps/s\n", dir, row->time, row->step, result->wall_time,
+         1e-6 * result->grain_steps_per_second);
+  if (isfinite(row->sigma_xx))
+    printf("  stress      sigma_xx %.5g Pa, sigma_yy %.5g Pa; from boundary forces %.5g, %.5g Pa, inertia %.2g, %.2g Pa\n",
+           row->sigma_xx, row->sigma_yy, row->sigma_xx_boundary, row->sigma_yy_boundary, row->sigma_xx_inertia,
+           row->sigma_yy_inertia);
+  if (row->axial_strain > 0)
+    printf("  strain      axial %.4g, volumetric %.4g (dilation positive)\n", row->axial_strain, row->volumetric_strain);
+  printf("  energy      residual %.2g of the total work; friction %.4g J, damping %.4g J\n", row->energy_residual,
+         row->dissipated_friction, row->dissipated_damping);
+  printf("  accuracy    dt/dt_crit %.3g", row->dt_ratio);
+  if (isfinite(row->phi)) printf(", phi %.3g, psi %.3g", row->phi, row->psi);
+  printf("\n");
+}
+
+static int draw_figures(const char *dir) {
+  tal_error err;
+  int count = 0;
+  tal_status status = tal_figures_draw(dir, &count, &err);
+  if (status) {
+    fprintf(stderr, "talus: figures not drawn: %s\n", err.text);
+    return status;
+  }
+  printf("  figures     %d in %s/figures\n", count, dir);
+  return TAL_OK;
+}
+
+static int finish(tal_status status, const tal_run_result *result, const tal_cli_options *options, const char *dir,
+                  const tal_error *err) {
+  switch (status) {
+  case TAL_OK:
+    if (result->already_done) {
+      printf("%s: the run is complete, nothing to resume\n", dir);
+      return TAL_OK;
+    }
+    if (!options->quiet) print_summary(result, dir);
+    return options->figures ? draw_figures(dir) : TAL_OK;
+  case TAL_INTERRUPTED:
+    fprintf(stderr, "talus: interrupted; go on with: talus run %s -o %s --resume\n", options->argument, dir);
+    return status;
+  case TAL_INVALID:
+    fprintf(stderr, "talus: %s", err->text);
+    if (result->checkpoint) fprintf(stderr, "; last good checkpoint: %s/checkpoint.h5", dir);
+    fprintf(stderr, "\n");
+    return status;
+  case TAL_BAD_INPUT: // the sentence names file, line and key itself
+    fprintf(stderr, "%s\n", err->text);
+    return status;
+  default:
+    return tal_cli_print_error(status, err);
+  }
+}
+
+int tal_cli_run(int argc, char **argv) {
+  tal_cli_options options;
+  int exit_code;
+  const unsigned accepted =
+      TAL_CLI_OUT | TAL_CLI_THREADS | TAL_CLI_SET | TAL_CLI_RESUME | TAL_CLI_QUIET | TAL_CLI_FIGURES;
+  if (!tal_cli_options_parse(&options, "run", accepted, "SCENE.yaml", argc, argv, &exit_code)) return exit_code;
+  tal_scene scene;
+  tal_scene_errors errors;
+  if (tal_scene_load(&scene, options.argument, options.sets, options.set_count, &errors)) {
+    tal_cli_options_clear(&options);
+    return tal_cli_print_errors(&errors);
+  }
+  const char *dir = options.out ? options.out : scene.name;
+  tal_run_options plan = {dir, options.threads, options.resume, options.quiet};
+  tal_run_result result;
+  tal_error err = {""};
+  exit_code = finish(tal_run_scene(&scene, &plan, &result, &err), &result, &options, dir, &err);
+  tal_scene_clear(&scene);
+  tal_cli_options_clear(&options);
+  return exit_code;
+}

@@ -1,0 +1,27 @@
+#include "contacts.h"
+
+#include <stdlib.h>
+
+void tal_contacts_init(tal_contacts *contacts) { *contacts = (tal_contacts){0}; }
+
+void tal_contacts_clear(tal_contacts *contacts) {
+#define X(type, name, unit, kept, meaning) free(contacts->name);
+  TAL_CONTACT_FIELDS(X)
+#undef X
+  *contacts = (tal_contacts){0};
+}
+
+void tal_contacts_reserve(tal_contacts *contacts, size_t capacity) {
+  if (capacity <= contacts->capacity) return;
+#define X(type, name, unit, kept, meaning)                                                                             \
+  contacts->name = tal_grow(contacts->name, contacts->capacity, capacity, sizeof(type));
+  TAL_CONTACT_FIELDS(X)
+#undef X
+  contacts->capacity = capacity;
+}
+
+void tal_contacts_swap(tal_contacts *a, tal_contacts *b) {
+  tal_contacts held = *a;
+  *a = *b;
+  *b = held;
+}

@@ -1,0 +1,40 @@
+// Contact slots: one per candidate pair (grain-grain) or per candidate grain-wall meeting. A slot touches when overlap > 0.
+// Force on grain i: (fe + fd) n + ft t with n = (nx, ny) the unit normal INTO i (from j, or from the wall) and
+// t = (-ny, nx). Grain j gets the opposite. The contact point lies at x_i - (r_i - overlap/2) n (wall: r_i - overlap).
+#ifndef TAL_CONTACTS_H
+#define TAL_CONTACTS_H
+
+#include "base.h"
+
+// X(type, name, unit, kept, meaning), as in grains.h.
+#define TAL_CONTACT_FIELDS(X)                                                                                          \
+  X(int32_t, i, "1", STATE, "grain, i < j")                                                                            \
+  X(int32_t, j, "1", STATE, "grain, or index of the wall in a list of wall contacts")                                  \
+  X(double, stiffness, "N/m^1.5 | N/m", WORK, "K of the normal law")                                                   \
+  X(double, damping, "N s/m^1.5 | N s/m", WORK, "coefficient of the viscous part of the normal law")                   \
+  X(double, friction, "1", WORK, "coefficient of friction")                                                            \
+  X(double, spring, "N", STATE, "tangential spring force after the last step (spring law only)")                       \
+  X(double, spring_stiffness, "N/m", STATE, "tangential stiffness after the last step (spring law only)")              \
+  X(double, nx, "1", WORK, "unit normal into i")                                                                       \
+  X(double, ny, "1", WORK, "unit normal into i")                                                                       \
+  X(double, overlap, "m", WORK, "positive in contact, negative: the gap")                                              \
+  X(double, fe, "N", WORK, "elastic part of the normal force, >= 0")                                                   \
+  X(double, fd, "N", WORK, "the rest of the normal force: viscous part after clipping, fe + fd >= 0")                  \
+  X(double, ft, "N", WORK, "tangential force on i along t")                                                            \
+  X(double, slip, "m/s", WORK, "slip speed of i against j along t, with its sign (observed states only)")
+
+typedef struct tal_contacts {
+  size_t count, capacity;
+#define X(type, name, unit, kept, meaning) type *name; // owned; [capacity]
+  TAL_CONTACT_FIELDS(X)
+#undef X
+} tal_contacts;
+
+void tal_contacts_init(tal_contacts *contacts);
+void tal_contacts_clear(tal_contacts *contacts);
+// Room for `capacity` slots (never shrinks); contents are kept.
+void tal_contacts_reserve(tal_contacts *contacts, size_t capacity);
+// Exchanges the contents of two lists.
+void tal_contacts_swap(tal_contacts *a, tal_contacts *b);
+
+#endif

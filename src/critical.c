@@ -1,0 +1,126 @@
+#include "critical.h"
+
+#include "effects.h"
+#include "law.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+// (lambda/4) dt^2 + gamma dt = 1 with lambda = k/m and gamma = c/m: where the amplification of verlet with predicted
+// velocities reaches -1.
+static double limit(double lambda, double gamma) {
+  if (lambda <= 0) return gamma > 0 ? 1 / gamma : (double)INFINITY;
+  double half = 2 * gamma / lambda;
+  return 4 / lambda / (half + sqrt(half * half + 4 / lambda));
+}
+
+double tal_critical_step_pair(double stiffness, double damping, double reduced_mass) {
+  return limit(stiffness / reduced_mass, damping / reduced_mass);
+}
+
+// Tangent stiffness (the tangential spring with it, turned into translation) and damping of a touching slot.
+static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double *stiffness, double *damping) {
+  double root = sqrt(s->overlap[c]);
+  *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
+  *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
+  if (sim->effects & TAL_EFFECT_SPRING) {
+    const tal_grains *g = &sim->grains;
+    int32_t i = s->i[c];
+    double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;
+    *stiffness += turning * sim->constants.tangential_ratio * *stiffness;
+  }
+}
+
+static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, double (*sum)[2]) {
+  for (size_t c = 0; c < s->count; c++) {
+    if (s->overlap[c] <= 0) continue;
+    double k, d;
+    slot_slopes(sim, s, c, &k, &d);
+    sum[s->i[c]][0] += k;
+    sum[s->i[c]][1] += d;
+    if (!pairs) continue;
+    sum[s->j[c]][0] += k;
+    sum[s->j[c]][1] += d;
+  }
+}
+
+double tal_critical_step(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  double(*sum)[2] = tal_alloc(g->count, sizeof *sum);
+  add_slots(sim, &sim->pairs, true, sum);
+  add_slots(sim, &sim->wall_contacts, false, sum);
+  double least = INFINITY;
+  const tal_contacts *s = &sim->pairs;
+  for (size_t c = 0; c < s->count; c++) {
+    if (s->overlap[c] <= 0) continue;
+    int32_t i = s->i[c], j = s->j[c];
+    least = fmin(least, limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
+                              sum[i][1] * g->inverse_mass[i] + sum[j][1] * g->inverse_mass[j]));
+  }
+  s = &sim->wall_contacts;
+  for (size_t c = 0; c < s->count; c++) {
+    if (s->overlap[c] <= 0) continue;
+    int32_t i = s->i[c];
+    least = fmin(least, limit(sum[i][0] * g->inverse_mass[i], sum[i][1] * g->inverse_mass[i]));
+  }
+  free(sum);
+  return least;
+}
+
+double tal_quasistatic_coefficient(const tal_sim *sim, double rate, double pressure, double height) {
+  const tal_constants *k = &sim->constants;
+  double force = pressure * 2 * k->mean_radius * k->thickness;
+  return k->mean_mass * (rate * height / 2) * rate / force * sqrt(2 * (double)sim->grains.count);
+}
+
+double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
+  const tal_grains *g = &sim->grains;
+  const tal_contacts *s = &sim->pairs;
+  double largest = 0;
+  *grain = -1;
+  for (size_t c = 0; c < s->count; c++) {
+    double share = s->overlap[c] / fmin(g->r[s->i[c]], g->r[s->j[c]]);
+    if (share > largest) *grain = g->id[s->i[c]];
+    largest = fmax(largest, share);
+  }
+  s = &sim->wall_contacts;
+  for (size_t c = 0; c < s->count; c++) {
+    double share = s->overlap[c] / g->r[s->i[c]];
+    if (share > largest) *grain = g->id[s->i[c]];
+    largest = fmax(largest, share);
+  }
+  return largest;
+}
+
+// Overlap of two mean grains that carry the mean contact force p 2R h of a confined assembly [P 2.2].
+static double confined_slope(const tal_scene *scene, const tal_constants *k, double pressure, double *damping) {
+  double stiffness = tal_hertz_stiffness(k->modulus, k->modulus, k->mean_radius / 2);
+  double overlap = pow(pressure * 2 * k->mean_radius * k->thickness / stiffness, 2.0 / 3);
+  *damping = scene->material.damping * stiffness * sqrt(overlap);
+  return tal_hertz_slope(stiffness, sqrt(overlap));
+}
+
+double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, double reduced_mass) {
+  if (strcmp(scene->contact.normal, "linear") == 0) {
+    double stiffness = scene->contact.stiffness, damping = 0;
+    if (!isnan(scene->contact.damping)) damping = scene->contact.damping;
+    if (!isnan(scene->contact.restitution))
+      damping = 2 * tal_linear_damping_ratio(scene->contact.restitution) * sqrt(stiffness * reduced_mass);
+    return tal_critical_step_pair(stiffness, damping, reduced_mass);
+  }
+  double least = INFINITY;
+  for (size_t s = 0; s < scene->stage_count; s++) {
+    if (!(scene->stages[s].pressure > 0)) continue;
+    double damping, slope = confined_slope(scene, k, scene->stages[s].pressure, &damping);
+    least = fmin(least, tal_critical_step_pair(slope, damping, k->mean_mass / 2));
+  }
+  return least;
+}
+
+double tal_friction_step(const tal_sim *sim, double pressure) {
+  const tal_constants *k = &sim->constants;
+  double cap = sim->scene->material.friction * pressure * 2 * k->mean_radius * k->thickness;
+  if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0)) return INFINITY;
+  // two free disks: the slip answers a tangential force with 2 (1/m + R^2/I) = 6/m
+  return k->vR * k->mean_mass / (6 * cap);
+}

@@ -1,0 +1,120 @@
+#include "energy.h"
+
+#include "effects.h"
+#include "forces.h"
+#include "law.h"
+
+double tal_energy_kinetic(const tal_grains *g) {
+  double sum = 0;
+  for (size_t i = 0; i < g->count; i++)
+    sum += 0.5 * g->mass[i] * (g->vx[i] * g->vx[i] + g->vy[i] * g->vy[i]) +
+           0.5 * g->inertia[i] * g->omega[i] * g->omega[i];
+  return sum;
+}
+
+double tal_energy_gravity(const tal_grains *g, const double gravity[2]) {
+  double sum = 0;
+  if (gravity[0] == 0 && gravity[1] == 0) return 0;
+  for (size_t i = 0; i < g->count; i++)
+    if (g->inverse_mass[i] > 0) sum -= g->mass[i] * (gravity[0] * g->x[i] + gravity[1] * g->y[i]);
+  return sum;
+}
+
+static double normal_energy(const tal_sim *sim, const tal_contacts *s, size_t c) {
+  if (s->overlap[c] <= 0) return 0;
+  return sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_energy(s->stiffness[c], s->overlap[c])
+                                         : tal_linear_energy(s->stiffness[c], s->overlap[c]);
+}
+
+static double spring_energy(const tal_contacts *s, size_t c) {
+  return s->spring_stiffness[c] > 0 ? 0.5 * s->spring[c] * s->spring[c] / s->spring_stiffness[c] : 0;
+}
+
+double tal_energy_wall_slot(const tal_sim *sim, size_t c) { return normal_energy(sim, &sim->wall_contacts, c); }
+
+double tal_energy_springs(const tal_sim *sim) {
+  double sum = 0;
+  if (!(sim->effects & TAL_EFFECT_SPRING)) return 0;
+  for (size_t c = 0; c < sim->pairs.count; c++) sum += spring_energy(&sim->pairs, c);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++) sum += spring_energy(&sim->wall_contacts, c);
+  return sum;
+}
+
+double tal_energy_elastic(const tal_sim *sim) {
+  double sum = 0;
+  for (size_t c = 0; c < sim->pairs.count; c++) sum += normal_energy(sim, &sim->pairs, c);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++) sum += normal_energy(sim, &sim->wall_contacts, c);
+  return sum + tal_energy_springs(sim);
+}
+
+// Power of each kind of force on one grain [W].
+typedef struct power {
+  double friction, damping, boundary, held;
+} power;
+
+static power grain_power(const tal_sim *sim, size_t i) {
+  const tal_grains *g = &sim->grains;
+  tal_resultant f = tal_forces_gather(sim, i);
+  power p = {f.friction_x * g->vx[i] + f.friction_y * g->vy[i] + f.torque * g->omega[i],
+             f.viscous_x * g->vx[i] + f.viscous_y * g->vy[i], 0, 0};
+  if (sim->effects & TAL_EFFECT_BOUNDARY) p.boundary = g->bx[i] * g->vx[i] + g->by[i] * g->vy[i];
+  if (sim->effects & TAL_EFFECT_HELD) {
+    const double *gravity = sim->scene->gravity;
+    if (g->inverse_mass[i] == 0)
+      p.held -= (g->rx[i] + g->mass[i] * gravity[0]) * g->vx[i] + (g->ry[i] + g->mass[i] * gravity[1]) * g->vy[i];
+    if (g->inverse_inertia[i] == 0) p.held -= f.torque * g->omega[i];
+  }
+  return p;
+}
+
+void tal_energy_credit(tal_sim *sim, double weight) {
+  tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++) {
+    power p = grain_power(sim, i);
+    g->friction_work[i] += weight * p.friction;
+    g->damping_work[i] += weight * p.damping;
+    g->boundary_work[i] += weight * p.boundary;
+    g->held_work[i] += weight * p.held;
+  }
+}
+
+// Accounts of the grains with the last instant counted half.
+static power grain_works(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  power sum = {0};
+  double half = sim->stage ? 0.5 * sim->dt : 0;
+  for (size_t i = 0; i < g->count; i++) {
+    power p = grain_power(sim, i);
+    sum.friction += g->friction_work[i] - half * p.friction;
+    sum.damping += g->damping_work[i] - half * p.damping;
+    sum.boundary += g->boundary_work[i] - half * p.boundary;
+    sum.held += g->held_work[i] - half * p.held;
+  }
+  return sum;
+}
+
+void tal_energy_row(const tal_sim *sim, tal_row *row) {
+  power work = grain_works(sim);
+  double wall = 0, wall_friction = 0, wall_damping = 0;
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    wall += sim->walls.wall[w].work;
+    wall_friction += sim->walls.wall[w].friction_work;
+    wall_damping += sim->walls.wall[w].damping_work;
+  }
+  row->kinetic = tal_energy_kinetic(&sim->grains);
+  row->elastic = tal_energy_elastic(sim);
+  row->gravity = tal_energy_gravity(&sim->grains, sim->scene->gravity);
+  row->work_walls = wall;
+  row->work_pressure = work.boundary;
+  row->work_held = work.held;
+  row->dissipated_friction = wall_friction - work.friction - tal_energy_springs(sim);
+  row->dissipated_damping = wall_damping - work.damping;
+  double change = row->kinetic - sim->run.kinetic0 + row->elastic - sim->run.elastic0 + row->gravity - sim->run.gravity0;
+  double input = wall + work.boundary + work.held;
+  double missing = change + row->dissipated_friction + row->dissipated_damping - input;
+  // The scale: everything that changed hands, and what was there to begin with.
+  double scale = fabs(wall) + fabs(work.boundary) + fabs(work.held) + fabs(row->dissipated_friction) +
+                 fabs(row->dissipated_damping) + fabs(row->gravity - sim->run.gravity0) + sim->run.kinetic0 +
+                 sim->run.elastic0;
+  row->energy_residual = scale > 0 ? missing / scale : 0;
+}

@@ -1,0 +1,52 @@
+// The grains: structure of arrays generated from one field list. Index order is id order (ids ascend).
+#ifndef TAL_GRAINS_H
+#define TAL_GRAINS_H
+
+#include "base.h"
+
+// X(type, name, unit, kept, meaning). kept: STATE is what a checkpoint holds, WORK can be recomputed.
+#define TAL_GRAIN_FIELDS(X)                                                                                            \
+  X(int64_t, id, "1", STATE, "identity, 0-based, ascending")                                                           \
+  X(double, x, "m", STATE, "centre")                                                                                   \
+  X(double, y, "m", STATE, "centre")                                                                                   \
+  X(double, r, "m", STATE, "radius")                                                                                   \
+  X(double, theta, "rad", STATE, "rotation, counter-clockwise")                                                        \
+  X(double, vx, "m/s", STATE, "velocity at the instant of x")                                                          \
+  X(double, vy, "m/s", STATE, "velocity at the instant of y")                                                          \
+  X(double, omega, "rad/s", STATE, "spin, counter-clockwise")                                                          \
+  X(double, fx, "N", STATE, "force that drives the next half step: contacts, boundaries, gravity")                     \
+  X(double, fy, "N", STATE, "force that drives the next half step: contacts, boundaries, gravity")                     \
+  X(double, torque, "N m", STATE, "torque that drives the next half step")                                             \
+  X(double, mass, "kg", STATE, "mass, scaling included")                                                               \
+  X(double, inertia, "kg m^2", STATE, "moment of inertia, scaling included")                                           \
+  X(double, inverse_mass, "1/kg", STATE, "0 for a fixed grain")                                                        \
+  X(double, inverse_inertia, "1/(kg m^2)", STATE, "0 where the spin is held")                                          \
+  X(double, friction_work, "J", STATE, "work done on the grain by tangential contact forces")                          \
+  X(double, damping_work, "J", STATE, "work done on the grain by the viscous part of normal contact forces")           \
+  X(double, boundary_work, "J", STATE, "work done on the grain by boundary forces (pressure)")                         \
+  X(double, held_work, "J", STATE, "work done by what holds a fixed grain or a held spin")                             \
+  X(double, window_vx, "m/s", STATE, "velocity when the window of mean forces began")                                  \
+  X(double, window_vy, "m/s", STATE, "velocity when the window of mean forces began")                                  \
+  X(double, bx, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
+  X(double, by, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
+  X(double, ux, "m/s", WORK, "velocity the contact laws see: predicted for the end of the step")                       \
+  X(double, uy, "m/s", WORK, "velocity the contact laws see: predicted for the end of the step")                       \
+  X(double, uomega, "rad/s", WORK, "spin the contact laws see")                                                        \
+  X(double, rx, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
+  X(double, ry, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
+  X(double, rtorque, "N m", WORK, "observed resultant torque")                                                         \
+  X(double, x_list, "m", WORK, "centre when the neighbour list was built")                                             \
+  X(double, y_list, "m", WORK, "centre when the neighbour list was built")
+
+typedef struct tal_grains {
+  size_t count;
+#define X(type, name, unit, kept, meaning) type *name; // owned; [count]
+  TAL_GRAIN_FIELDS(X)
+#undef X
+} tal_grains;
+
+// Zeroed arrays for `count` grains, ids 0..count-1.
+void tal_grains_init(tal_grains *grains, size_t count);
+void tal_grains_clear(tal_grains *grains);
+
+#endif

@@ -1,0 +1,15 @@
+// Friction as a viscous regularisation of Coulomb's law, eq (6) of docs/method.md [P 2.18]:
+// ft = mu fn (|s|/vR)^(1/c), against the slip s; fn is the full normal force.
+#ifndef TAL_LAW_REGULARISED_H
+#define TAL_LAW_REGULARISED_H
+
+#include "root.h"
+#include <math.h>
+
+// friction * normal [N], slip [m/s] with sign; returns the force on i along t [N].
+TAL_KERNEL double tal_regularised_force(double cap, double slip, double inverse_vR, double inverse_exponent) {
+  double f = cap * tal_root(fabs(slip) * inverse_vR, inverse_exponent);
+  return slip > 0 ? -f : f;
+}
+
+#endif

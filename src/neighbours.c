@@ -1,0 +1,188 @@
+// The neighbour list. Slots ascend by (i, j); each grain's incidences come out in the order of its partners because the
+// slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
+#include "neighbours.h"
+
+#include "energy.h"
+#include "law.h"
+#include "sim.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+void tal_neighbours_init(tal_neighbours *neighbours) { *neighbours = (tal_neighbours){0}; }
+
+void tal_neighbours_clear(tal_neighbours *neighbours) {
+  geo_pairs_clear(&neighbours->pairs);
+  free(neighbours->first);
+  free(neighbours->slot);
+  free(neighbours->wall_first);
+  *neighbours = (tal_neighbours){0};
+}
+
+// Reduced mass of a contact [kg]; an immovable side counts as infinitely heavy.
+static double reduced_mass(double inverse_i, double inverse_j) {
+  double sum = inverse_i + inverse_j;
+  return sum > 0 ? 1 / sum : 0;
+}
+
+static double slot_damping(const tal_sim *sim, double stiffness, double mass) {
+  const tal_scene_contact *law = &sim->scene->contact;
+  if (sim->effects & TAL_EFFECT_HERTZ) return sim->scene->material.damping * stiffness;
+  if (isnan(law->restitution)) return isnan(law->damping) ? 0 : law->damping;
+  return 2 * tal_linear_damping_ratio(law->restitution) * sqrt(stiffness * mass);
+}
+
+static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t j) {
+  const tal_grains *g = &sim->grains;
+  double reduced = g->r[i] * g->r[j] / (g->r[i] + g->r[j]);
+  double modulus = sim->constants.modulus;
+  slots->i[c] = i;
+  slots->j[c] = j;
+  slots->stiffness[c] = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced)
+                                                        : sim->scene->contact.stiffness;
+  slots->damping[c] =
+      slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
+  slots->friction[c] = sim->friction;
+  slots->spring[c] = slots->spring_stiffness[c] = 0;
+}
+
+static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t w) {
+  const tal_grains *g = &sim->grains;
+  const tal_wall *wall = &sim->walls.wall[w];
+  slots->i[c] = i;
+  slots->j[c] = w;
+  slots->stiffness[c] = sim->effects & TAL_EFFECT_HERTZ
+                            ? tal_hertz_stiffness(sim->constants.modulus, wall->modulus, g->r[i])
+                            : sim->scene->contact.stiffness;
+  slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], 0));
+  slots->friction[c] = wall->friction;
+  slots->spring[c] = slots->spring_stiffness[c] = 0;
+}
+
+// Both lists ascend by (i, j): one merge carries the histories over.
+static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
+  size_t o = 0;
+  for (size_t c = 0; c < slots->count; c++) {
+    while (o < old->count && (old->i[o] < slots->i[c] || (old->i[o] == slots->i[c] && old->j[o] < slots->j[c]))) o++;
+    if (o < old->count && old->i[o] == slots->i[c] && old->j[o] == slots->j[c]) {
+      slots->spring[c] = old->spring[o];
+      slots->spring_stiffness[c] = old->spring_stiffness[o];
+    }
+  }
+}
+
+static void list_pairs(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  geo_pairs *pairs = &sim->neighbours.pairs;
+  geo_cells_pairs(g->x, g->y, g->r, g->count, sim->constants.skin, pairs);
+  tal_contacts fresh;
+  tal_contacts_init(&fresh);
+  tal_contacts_reserve(&fresh, pairs->count + pairs->count / 16 + 64);
+  fresh.count = pairs->count;
+  for (size_t c = 0; c < pairs->count; c++) fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
+  if (sim->effects & TAL_EFFECT_SPRING) carry_springs(&sim->pairs, &fresh);
+  tal_contacts_swap(&sim->pairs, &fresh);
+  tal_contacts_clear(&fresh);
+}
+
+// A wall that vanishes takes the elastic energy of its contacts with it.
+static void book_vanished(tal_sim *sim) {
+  for (size_t c = 0; c < sim->wall_contacts.count; c++) {
+    tal_wall *wall = &sim->walls.wall[sim->wall_contacts.j[c]];
+    if (!tal_wall_active(wall, sim->run.time)) wall->work -= tal_energy_wall_slot(sim, c);
+  }
+}
+
+static void list_walls(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  book_vanished(sim);
+  tal_contacts fresh;
+  tal_contacts_init(&fresh);
+  for (size_t i = 0; i < g->count; i++) {
+    sim->neighbours.wall_first[i] = (int32_t)fresh.count;
+    for (size_t w = 0; w < sim->walls.count; w++) {
+      const tal_wall *wall = &sim->walls.wall[w];
+      if (!tal_wall_active(wall, sim->run.time)) continue;
+      if (tal_wall_nearest(wall, g->x[i], g->y[i]).distance >= g->r[i] + sim->constants.skin) continue;
+      if (fresh.count == fresh.capacity) tal_contacts_reserve(&fresh, fresh.capacity * 2 + 64);
+      fill_wall(sim, &fresh, fresh.count++, (int32_t)i, (int32_t)w);
+    }
+  }
+  sim->neighbours.wall_first[g->count] = (int32_t)fresh.count;
+  if (sim->effects & TAL_EFFECT_SPRING) carry_springs(&sim->wall_contacts, &fresh);
+  tal_contacts_swap(&sim->wall_contacts, &fresh);
+  tal_contacts_clear(&fresh);
+}
+
+// Deals the slots out to their grains: counts, then fills in slot order.
+static void list_incidences(tal_sim *sim) {
+  tal_neighbours *n = &sim->neighbours;
+  const tal_contacts *slots = &sim->pairs;
+  size_t count = sim->grains.count;
+  if (n->slot_capacity < 2 * slots->count) {
+    free(n->slot);
+    n->slot_capacity = 2 * slots->capacity;
+    n->slot = tal_alloc(n->slot_capacity, sizeof *n->slot);
+  }
+  memset(n->first, 0, (count + 1) * sizeof *n->first);
+  for (size_t c = 0; c < slots->count; c++) {
+    n->first[slots->i[c] + 1]++;
+    n->first[slots->j[c] + 1]++;
+  }
+  for (size_t i = 0; i < count; i++) n->first[i + 1] += n->first[i];
+  for (size_t c = 0; c < slots->count; c++) {
+    n->slot[n->first[slots->i[c]]++] = (int32_t)c;
+    n->slot[n->first[slots->j[c]]++] = ~(int32_t)c;
+  }
+  memmove(n->first + 1, n->first, count * sizeof *n->first);
+  n->first[0] = 0;
+}
+
+void tal_neighbours_rebuild(tal_sim *sim) {
+  tal_neighbours *n = &sim->neighbours;
+  tal_grains *g = &sim->grains;
+  if (n->grain_capacity != g->count || !n->first) {
+    free(n->first);
+    free(n->wall_first);
+    n->first = tal_alloc(g->count + 1, sizeof *n->first);
+    n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
+    n->grain_capacity = g->count;
+  }
+  list_pairs(sim);
+  list_walls(sim);
+  list_incidences(sim);
+  memcpy(g->x_list, g->x, g->count * sizeof *g->x);
+  memcpy(g->y_list, g->y, g->count * sizeof *g->y);
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    tal_wall *wall = &sim->walls.wall[w];
+    wall->x_list = wall->x0;
+    wall->y_list = wall->y0;
+    wall->listed = tal_wall_active(wall, sim->run.time);
+  }
+  n->rebuilds++;
+}
+
+// Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.
+static double largest_displacement(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  double largest = 0;
+  bool finite = true;
+#pragma omp parallel for simd schedule(static) reduction(max : largest) reduction(&& : finite) if (g->count > 2000)
+  for (size_t i = 0; i < g->count; i++) {
+    double dx = g->x[i] - g->x_list[i], dy = g->y[i] - g->y_list[i];
+    double d2 = dx * dx + dy * dy;
+    largest = d2 > largest ? d2 : largest;
+    finite = finite && d2 <= 1e300;
+  }
+  return finite ? largest : (double)NAN;
+}
+
+bool tal_neighbours_stale(const tal_sim *sim) {
+  double grains = sqrt(largest_displacement(sim)), other = grains;
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    const tal_wall *wall = &sim->walls.wall[w];
+    other = fmax(other, hypot(wall->x0 - wall->x_list, wall->y0 - wall->y_list));
+    if (tal_wall_active(wall, sim->run.time) != (wall->listed != 0)) return true;
+  }
+  return !(grains + other < sim->constants.skin);
+}

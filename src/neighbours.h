@@ -1,0 +1,27 @@
+// The neighbour list: candidate slots within a skin, and for each grain its slots in the order of its partners' ids.
+#ifndef TAL_NEIGHBOURS_H
+#define TAL_NEIGHBOURS_H
+
+#include "cells.h"
+#include <stdbool.h>
+
+struct tal_sim;
+
+typedef struct tal_neighbours {
+  geo_pairs pairs;       // scratch of the bucket grid
+  int32_t *first;        // owned; [n + 1] start of each grain's incidences
+  int32_t *slot;         // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
+  int32_t *wall_first;   // owned; [n + 1] the same for wall contacts; only meaningful when there are any
+  size_t grain_capacity, slot_capacity;
+  uint64_t rebuilds;
+} tal_neighbours;
+
+void tal_neighbours_init(tal_neighbours *neighbours);
+void tal_neighbours_clear(tal_neighbours *neighbours);
+// Rebuilds the list of `sim` from the present centres; spring histories are carried over by (i, j).
+void tal_neighbours_rebuild(struct tal_sim *sim);
+// True when two bodies not on the list may have met since it was built, a wall has come or gone, or a coordinate is no
+// number.
+bool tal_neighbours_stale(const struct tal_sim *sim);
+
+#endif

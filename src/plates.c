@@ -1,0 +1,63 @@
+#include "plates.h"
+
+#include <math.h>
+
+void tal_plates_ensure(tal_sim *sim) {
+  if (tal_walls_plate(&sim->walls, +1)) return;
+  const tal_grains *g = &sim->grains;
+  double bottom = INFINITY, top = -INFINITY;
+  for (size_t i = 0; i < g->count; i++) {
+    bottom = fmin(bottom, g->y[i] - g->r[i]);
+    top = fmax(top, g->y[i] + g->r[i]);
+  }
+  for (int side = 1; side >= -1; side -= 2) {
+    tal_wall *plate = tal_walls_add(&sim->walls);
+    plate->plate = side;
+    plate->y0 = plate->y1 = side > 0 ? bottom : top;
+    plate->modulus = sim->constants.modulus;
+  }
+}
+
+double tal_plates_distance(const tal_sim *sim) {
+  return tal_walls_plate(&sim->walls, -1)->y0 - tal_walls_plate(&sim->walls, +1)->y0;
+}
+
+void tal_plates_drive(tal_sim *sim, double speed) {
+  tal_walls_plate(&sim->walls, +1)->vy = 0.5 * speed;
+  tal_walls_plate(&sim->walls, -1)->vy = -0.5 * speed;
+}
+
+static double width_at_plate(const tal_sim *sim, int side) {
+  const int32_t *node = sim->graph.loop.node;
+  const tal_run *run = &sim->run;
+  int32_t left = node[side > 0 ? run->arc_bottom_left : run->arc_top_left];
+  int32_t right = node[side > 0 ? run->arc_bottom_right : run->arc_top_right];
+  return sim->grains.x[right] - sim->grains.x[left];
+}
+
+static double loop_width(const tal_sim *sim) {
+  const geo_loop *loop = &sim->graph.loop;
+  double least = INFINITY, most = -INFINITY;
+  for (size_t k = 0; k < loop->count; k++) {
+    least = fmin(least, sim->grains.x[loop->node[k]]);
+    most = fmax(most, sim->grains.x[loop->node[k]]);
+  }
+  return most - least;
+}
+
+static void servo(tal_sim *sim, int side, double target, double speed_limit) {
+  tal_wall *plate = tal_walls_plate(&sim->walls, side);
+  double load = -side * plate->fy; // grains push the bottom plate (side +1) down
+  double resistance = plate->contact_stiffness * sim->dt + plate->contact_damping;
+  double outward = resistance > 0 ? 0.8 * (load - target) / resistance : -speed_limit;
+  outward = fmax(-speed_limit, fmin(speed_limit, outward));
+  plate->vy = -side * outward;
+}
+
+void tal_plates_servo(tal_sim *sim, double pressure, double seating, double speed_limit) {
+  double whole = seating > 0 ? loop_width(sim) : 0;
+  for (int side = 1; side >= -1; side -= 2) {
+    double width = (1 - seating) * width_at_plate(sim, side) + seating * whole;
+    servo(sim, side, pressure * sim->constants.thickness * width, speed_limit);
+  }
+}

@@ -1,0 +1,16 @@
+// The two plates of a biaxial test: horizontal walls without ends, one sided.
+#ifndef TAL_PLATES_H
+#define TAL_PLATES_H
+
+#include "sim.h"
+
+// Puts the plates against the outermost grains unless they are there. Same material as the grains.
+void tal_plates_ensure(tal_sim *sim);
+double tal_plates_distance(const tal_sim *sim); // [m]
+// Both plates approach each other at `speed` [m/s] in all, half each.
+void tal_plates_drive(tal_sim *sim, double speed);
+// Force servo, eq (23): each plate moves so that its load tends to `pressure` h times the width of the loop at the plate
+// (blended with the loop's whole width while seating, weight 0..1). speed_limit [m/s].
+void tal_plates_servo(tal_sim *sim, double pressure, double seating, double speed_limit);
+
+#endif

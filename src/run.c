@@ -1,0 +1,187 @@
+#include "run.h"
+
+#include "critical.h"
+#include "output.h"
+#include "progress.h"
+
+#include <math.h>
+#include <omp.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <time.h>
+
+// Set by the handler of SIGINT, SIGTERM and SIGUSR1; a signal has no other way to reach a loop.
+static volatile sig_atomic_t asked_to_stop;
+
+static void ask_to_stop(int number) {
+  (void)number;
+  asked_to_stop = 1;
+}
+
+static void catch_signals(void) {
+  struct sigaction action = {.sa_handler = ask_to_stop};
+  sigemptyset(&action.sa_mask);
+  asked_to_stop = 0;
+  sigaction(SIGINT, &action, NULL);
+  sigaction(SIGTERM, &action, NULL);
+  sigaction(SIGUSR1, &action, NULL);
+}
+
+static double clock_now(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_MONOTONIC, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+// A run under way: what the observers share.
+typedef struct job {
+  const tal_scene *scene;
+  tal_sim *sim;
+  tal_output *output;
+  tal_progress progress;
+  tal_row row;
+  tal_stage_report *stages; // owned; [stage_count]
+  double started, stage_started;
+  int64_t stage_first_step, first_step;
+  bool checkpoint; // one has been written, or the run was resumed from one
+} job;
+
+static tal_status write_checkpoint(job *this, tal_error *err) {
+  tal_status status = tal_output_checkpoint(this->output, this->sim, err);
+  if (status == TAL_OK) this->checkpoint = true;
+  return status;
+}
+
+// Whole number of steps nearest to `every`, at least 1; 0 for never.
+static int64_t cadence(double every, double dt) {
+  if (!isfinite(every)) return 0;
+  double steps = round(every / dt);
+  return steps < 1 ? 1 : (int64_t)steps;
+}
+
+static bool due(const tal_sim *sim, double every) {
+  int64_t steps = cadence(every, sim->dt);
+  return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
+}
+
+static tal_status write_row(job *this, bool fields, tal_error *err) {
+  tal_status status;
+  tal_sim_row(this->sim, &this->row);
+  if ((status = tal_output_row(this->output, &this->row, err))) return status;
+  if ((status = tal_output_tracks(this->output, this->sim, err))) return status;
+  return fields ? tal_output_fields(this->output, this->sim, err) : TAL_OK;
+}
+
+// Everything that looks at the run between two steps.
+static tal_status observe(job *this, tal_error *err) {
+  const tal_scene_output *plan = &this->scene->output;
+  bool fields = due(this->sim, plan->fields_every);
+  tal_status status = TAL_OK;
+  if (due(this->sim, plan->series_every) || fields) status = write_row(this, fields, err);
+  if (status) return status;
+  int64_t steps = cadence(plan->checkpoint_every, this->sim->dt);
+  if (tal_sim_done(this->sim) || (steps > 0 && this->sim->run.stage_step % steps == 0))
+    status = write_checkpoint(this, err);
+  return status;
+}
+
+static void account_stage(job *this, int64_t stage) {
+  tal_stage_report *report = &this->stages[stage];
+  double now = clock_now(), took = now - this->stage_started;
+  int64_t steps = this->sim->run.step - this->stage_first_step;
+  report->kind = this->scene->stages[stage].kind;
+  report->steps = this->sim->run.stage_step;
+  report->wall_time += took;
+  report->grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0;
+  this->stage_started = now;
+  this->stage_first_step = this->sim->run.step;
+}
+
+static tal_status report_run(job *this, const char *name, const char *reason, int cores, tal_run_result *result,
+                             tal_error *err) {
+  double took = clock_now() - this->started;
+  int64_t steps = this->sim->run.step - this->first_step;
+  result->row = this->row;
+  result->wall_time = took;
+  result->grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0;
+  result->critical_step = this->sim->dt / this->row.dt_ratio;
+  tal_run_report report = {.status = name,
+                           .reason = reason,
+                           .cores = cores,
+                           .wall_time = took,
+                           .grain_steps_per_second = result->grain_steps_per_second,
+                           .energy_residual = this->row.energy_residual,
+                           .stages = this->stages,
+                           .stage_count = this->scene->stage_count};
+  return tal_output_report(this->output, this->sim, &report, err);
+}
+
+static tal_status advance(job *this, tal_error *err) {
+  while (!tal_sim_done(this->sim)) {
+    if (asked_to_stop) return TAL_INTERRUPTED;
+    int64_t stage = this->sim->run.stage;
+    tal_status status = tal_sim_step(this->sim, err);
+    if (this->sim->run.stage != stage) { // the step belongs to the next stage
+      this->stage_first_step = this->sim->run.step - 1;
+      this->stage_started = clock_now();
+    }
+    if (status || (status = observe(this, err))) return status;
+    if (this->sim->run.stage_done) account_stage(this, this->sim->run.stage);
+    tal_progress_show(&this->progress, this->sim);
+  }
+  return TAL_OK;
+}
+
+// Steps until done, then says in run.json how it ended.
+static tal_status run_job(job *this, int cores, tal_run_result *result, tal_error *err) {
+  tal_status status = advance(this, err), reported;
+  if (status == TAL_OK && this->scene->stage_count == 0) status = write_checkpoint(this, err);
+  if (status != TAL_OK && this->scene->stage_count) account_stage(this, this->sim->run.stage);
+  switch (status) {
+  case TAL_OK:
+    return report_run(this, "done", "", cores, result, err);
+  case TAL_INTERRUPTED:
+    if ((reported = write_checkpoint(this, err))) return reported;
+    if ((reported = report_run(this, "interrupted", "", cores, result, err))) return reported;
+    return status;
+  case TAL_INVALID:
+    report_run(this, "invalid", err ? err->text : "", cores, result, NULL);
+    return status;
+  default:
+    return status;
+  }
+}
+
+static tal_status open_output(job *this, const tal_run_options *options, bool *finished, tal_error *err) {
+  *finished = false;
+  if (options->resume) return tal_output_resume(&this->output, options->dir, this->scene, this->sim, finished, err);
+  tal_status status = tal_output_create(&this->output, options->dir, this->scene, err);
+  if (status) return status;
+  return write_row(this, true, err);
+}
+
+tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
+                         tal_error *err) {
+  int cores = options->threads > 0 ? options->threads : omp_get_num_procs();
+  omp_set_num_threads(cores);
+  *result = (tal_run_result){0};
+  job run = {.scene = scene, .checkpoint = options->resume};
+  tal_status status = tal_sim_create(&run.sim, scene, err);
+  if (status) return status;
+  catch_signals();
+  status = open_output(&run, options, &result->already_done, err);
+  if (status == TAL_OK && !result->already_done) {
+    run.stages = tal_alloc(scene->stage_count + 1, sizeof *run.stages);
+    for (size_t s = 0; s < scene->stage_count; s++) run.stages[s].kind = scene->stages[s].kind;
+    run.started = run.stage_started = clock_now();
+    run.first_step = run.stage_first_step = run.sim->run.step;
+    tal_progress_begin(&run.progress, run.sim, options->quiet);
+    status = run_job(&run, cores, result, err);
+    tal_progress_end(&run.progress);
+    free(run.stages);
+    result->checkpoint = run.checkpoint;
+  }
+  if (run.output) tal_output_close(run.output);
+  tal_sim_free(run.sim);
+  return status;
+}

@@ -1,0 +1,157 @@
+// The scene: everything a user asks for, resolved to SI numbers. Filled from YAML by scene.c through one schema table.
+// Plain data; a scene never changes once a run has started.
+#ifndef TAL_SCENE_H
+#define TAL_SCENE_H
+
+#include "base.h"
+#include <stdbool.h>
+
+typedef enum tal_shape { TAL_DISK, TAL_SPHERE } tal_shape;
+typedef enum tal_radius_law { TAL_RADIUS_UNIFORM, TAL_RADIUS_LOGNORMAL, TAL_RADIUS_SIEVE } tal_radius_law;
+
+// NAN in an optional number means "not given" throughout.
+typedef struct tal_radius {
+  tal_radius_law law;
+  double min, max;      // [m] uniform; lognormal: cut-offs, 0 and INFINITY when not given
+  double median, sigma; // lognormal: median [m], standard deviation of ln r [-]
+  double (*passing)[2]; // sieve: owned; [passing_count][2] diameter [m], percent passing, both ascending
+  size_t passing_count;
+  int64_t sizes; // sieve: number of discrete sizes M
+} tal_radius;
+
+typedef struct tal_listed_grain {
+  double x, y, r;       // [m]
+  double vx, vy, omega; // [m/s, m/s, rad/s], omega counter-clockwise
+  double mass, inertia; // [kg, kg m^2], NAN: from the material
+  bool fixed;           // keeps its velocities for ever
+} tal_listed_grain;
+
+typedef struct tal_scene_grains {
+  int64_t count; // 0 when listed, from a file or on a lattice
+  tal_radius radius;
+  tal_listed_grain *list; // owned
+  size_t list_count;
+  tal_shape shape;
+  double thickness; // [m] NAN: twice the mean radius
+} tal_scene_grains;
+
+typedef struct tal_material {
+  double young;    // [Pa]
+  double poisson;  // [-]
+  double density;  // [kg/m^3] before mass scaling
+  double friction; // [-]
+  double damping;  // [s] T of the Hertz law [P 2.16]
+} tal_material;
+
+typedef struct tal_scene_contact {
+  const char *normal;      // name of a registered normal law
+  const char *tangential;  // name of a registered tangential law
+  double exponent;         // c of the regularised law [P 2.18]
+  double vR;               // [m/s] NAN: 2 rate Rmean of the first stage with a rate
+  double stiffness;        // [N/m] linear
+  double restitution;      // linear: delivered speed ratio, NAN when damping is given
+  double damping;          // [N s/m] linear, NAN when restitution is given
+  double tangential_ratio; // spring: k_t / k_n, NAN: Mindlin's 2(1-nu)/(2-nu)
+} tal_scene_contact;
+
+typedef struct tal_scene_wall {
+  double from[2], to[2];           // [m]
+  double velocity[2];              // [m/s]
+  double young, poisson, friction; // NAN: the material's; young may be INFINITY
+  double from_time, until_time;    // [s] active in from_time <= t < until_time; 0 and INFINITY by default
+} tal_scene_wall;
+
+typedef enum tal_lattice { TAL_LATTICE_TRIANGULAR, TAL_LATTICE_SQUARE } tal_lattice;
+
+typedef struct tal_scene_pack {
+  const char *method;    // name of a registered packer: drop_and_roll, lattice, file, none
+  double width;          // [m] drop_and_roll
+  char *path;            // file: owned, as given (relative to the scene file's folder)
+  tal_lattice pattern;   // lattice
+  int64_t columns, rows; // lattice
+  double gap;            // [m] lattice: between neighbours, negative = overlap
+  double cut_radius;     // [m] cut: {shape: circle, radius:}, NAN: no cut
+} tal_scene_pack;
+
+typedef struct tal_scene_continuum {
+  const char *backend;         // "cgal" | "qhull"
+  bool power;                  // tessellation: power
+  int64_t refresh_steps;       // 0 when another criterion is given
+  double refresh_strain;       // [-] NAN when not given
+  double refresh_displacement; // [mean diameters] NAN when not given
+  double peel;                 // [mean diameters]
+} tal_scene_continuum;
+
+typedef struct tal_scene_integrator {
+  const char *scheme; // name of a registered integrator
+  double dt;          // [s]
+  bool force;         // run above dt_crit
+} tal_scene_integrator;
+
+typedef struct tal_scene_stage {
+  const char *kind;                // name of a registered stage: free, confine, compress
+  const char *boundary;            // compress: name of a registered boundary
+  double duration;                 // [s] free
+  double pressure;                 // [Pa] confine, compress (NAN: inherited from confine; resolved by the loader)
+  double ramp;                     // [s] confine
+  double friction;                 // [-] confine; NAN: the material's
+  double tolerance;                // [-] confine: on the stresses, default 0.01
+  double unbalanced;               // [-] confine: mean unbalanced over mean contact force, default 1e-3
+  double timeout;                  // [s] confine: fails after this long, default 20 ramp + 20 s
+  double rate;                     // [1/s] compress
+  double strain;                   // [-] compress
+  tal_scene_integrator integrator; // the stage's own, else a copy of the scene's
+  int line;                        // of the stage in the file, for messages
+} tal_scene_stage;
+
+typedef struct tal_scene_output {
+  double series_every;     // [s]
+  double fields_every;     // [s] INFINITY: first and last state only
+  double checkpoint_every; // [s]
+  int64_t *tracks;         // owned; grain ids
+  size_t track_count;
+} tal_scene_output;
+
+typedef struct tal_scene {
+  char *name; // owned
+  char *path; // owned; the scene file as given, for messages and relative paths
+  uint64_t seed;
+  tal_scene_grains grains;
+  tal_material material;
+  double mass_scaling;
+  tal_scene_contact contact;
+  double gravity[2]; // [m/s^2]
+  bool rotation;
+  tal_scene_wall *walls; // owned
+  size_t wall_count;
+  tal_scene_pack pack;
+  tal_scene_continuum continuum;
+  double skin;          // neighbours.skin [mean diameters]
+  double overlap_limit; // limits.overlap [smaller radius]: beyond it the run stops
+  tal_scene_integrator integrator;
+  tal_scene_stage *stages; // owned
+  size_t stage_count;
+  tal_scene_output output;
+  int line_dt, line_width; // lines of integrator.dt and pack.width in the file (0 when absent), for later messages
+} tal_scene;
+
+// Up to ten messages, each "FILE:LINE: key: what is wrong, what is accepted", in file order.
+typedef struct tal_scene_errors {
+  size_t count;
+  tal_error item[10];
+} tal_scene_errors;
+
+// Reads and validates `path` with the overrides "key.sub=value" of --set applied on top. Returns TAL_OK with *scene
+// filled (free with tal_scene_clear), TAL_BAD_INPUT or TAL_IO with the messages in `errors` and *scene empty.
+tal_status tal_scene_load(tal_scene *scene, const char *path, const char *const *overrides, size_t override_count,
+                          tal_scene_errors *errors);
+void tal_scene_clear(tal_scene *scene);
+// The scene as resolved (every key with its value, defaults included) as YAML that loads to the same scene; owned by
+// the caller. Canonical: equal scenes give equal text (its hash identifies a checkpoint's scene).
+char *tal_scene_text(const tal_scene *scene);
+// `path` as it stands in the scene, relative to the scene file's folder; owned by the caller.
+char *tal_scene_relative(const tal_scene *scene, const char *path);
+// Mean radius [m] by the radius law or the list; NAN when only the packing file knows it.
+double tal_scene_mean_radius(const tal_scene *scene);
+
+#endif

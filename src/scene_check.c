@@ -1,0 +1,260 @@
+// Combinations of keys. Each check looks at what the user wrote (the tree) and at the values read; a value that was
+// wrong in itself is NAN, 0 or NULL here and is not complained about twice.
+#include "scene_check.h"
+
+#include "radius.h"
+#include "scene_value.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+typedef struct checker {
+  const tal_scene *scene;
+  tal_node *root;
+  tal_report *report;
+} checker;
+
+static bool given(const checker *c, const char *path) {
+  return tal_node_find(c->root, path) != NULL;
+}
+
+static bool named(const char *choice, const char *name) {
+  return choice && strcmp(choice, name) == 0;
+}
+
+// Reports at the key, or where its nearest parent stands.
+static void wrong(const checker *c, const char *path, const char *what) {
+  tal_report_add(c->report, tal_node_nearest(c->root, path), path, "%s", what);
+}
+
+// Same for a key that is not there; a parent that is no mapping has been complained about.
+static void missing(const checker *c, const char *path, const char *what) {
+  const tal_node *near = tal_node_nearest(c->root, path);
+  if (near->kind == TAL_NODE_MAP)
+    tal_report_add(c->report, near, path, "%s", what);
+}
+
+// ---- grains and packing ----
+
+static void check_source(const checker *c) {
+  const char *method = c->scene->pack.method;
+  bool count = given(c, "grains.count"), list = given(c, "grains.list");
+  bool file = named(method, "file"), lattice = named(method, "lattice");
+  bool unknown = !method && given(c, "pack.method");
+  if (count && list)
+    wrong(c, "grains.list", "stands beside grains.count; accepted: one of the two");
+  else if (file && count)
+    wrong(c, "grains.count", "the file says how many grains there are; accepted: no count with pack.method: file");
+  else if (lattice && count)
+    wrong(c, "grains.count", "columns and rows say how many; accepted: no count with pack.method: lattice");
+  else if (count && named(method, "none"))
+    wrong(c, "pack.method",
+          "'none' leaves grains.count grains without places; accepted: drop_and_roll, or grains.list");
+  else if (list && method && !named(method, "none"))
+    wrong(c, "pack.method", "listed grains have their places; accepted: none with grains.list");
+  else if (!count && !list && !file && !lattice && !unknown)
+    missing(c, "grains.count", "is missing; accepted: grains.count, grains.list, or pack.method: lattice or file");
+}
+
+static void check_radius_law(const checker *c) {
+  const tal_radius *radius = &c->scene->grains.radius;
+  tal_error err;
+  bool window = radius->law != TAL_RADIUS_SIEVE;
+  bool complete = window ? !isnan(radius->min) && !isnan(radius->max) : radius->passing_count && radius->sizes;
+  if (radius->law == TAL_RADIUS_LOGNORMAL)
+    complete = complete && !isnan(radius->median) && !isnan(radius->sigma);
+  if (!complete)
+    return;
+  char text[200];
+  if (window && radius->min > radius->max) {
+    snprintf(text, sizeof text, "min %g is larger than max %g; accepted: min <= max", radius->min, radius->max);
+    wrong(c, given(c, "grains.radius.min") ? "grains.radius.min" : "grains.radius.max", text);
+  } else if (tal_radius_check(radius, &err) != TAL_OK) {
+    wrong(c, window ? "grains.radius" : "grains.radius.passing", err.text);
+  } else if (named(c->scene->pack.method, "lattice") && isnan(tal_radius_single(radius))) {
+    wrong(c, "grains.radius", "a lattice needs equal grains; accepted: {law: uniform, min: R, max: R}");
+  }
+}
+
+static void check_radius(const checker *c) {
+  bool list = given(c, "grains.list"), file = named(c->scene->pack.method, "file");
+  bool wanted = given(c, "grains.count") || named(c->scene->pack.method, "lattice");
+  if (given(c, "grains.radius")) {
+    if (list)
+      wrong(c, "grains.radius", "has no effect with grains.list; accepted: r of each grain");
+    else if (file)
+      wrong(c, "grains.radius", "has no effect with pack.method: file; accepted: the file's column r");
+    else
+      check_radius_law(c);
+  } else if (wanted) {
+    missing(c, "grains.radius",
+            "is missing; accepted: {law: uniform, min: 0.5e-3, max: 1e-3}, or law: lognormal, sieve");
+  }
+}
+
+static double largest_radius(const tal_radius *radius) {
+  if (radius->law == TAL_RADIUS_SIEVE)
+    return radius->passing_count ? radius->passing[radius->passing_count - 1][0] / 2 : nan("");
+  return isinf(radius->max) ? radius->median : radius->max;
+}
+
+static void check_box(const checker *c) {
+  const tal_scene *scene = c->scene;
+  double largest = largest_radius(&scene->grains.radius);
+  if (!named(scene->pack.method, "drop_and_roll") || !(scene->pack.width < 2 * largest))
+    return;
+  char text[200];
+  snprintf(text, sizeof text, "%g m is too narrow for grains of radius %g m; accepted: at least two radii, better 20",
+           scene->pack.width, largest);
+  wrong(c, "pack.width", text);
+}
+
+static void check_lattice(const checker *c) {
+  const tal_scene_pack *pack = &c->scene->pack;
+  if (!named(pack->method, "lattice"))
+    return;
+  if ((double)pack->columns * (double)pack->rows > 1e8)
+    wrong(c, "pack.rows", "columns times rows is too large; accepted: at most 100000000 grains");
+  double radius = tal_radius_single(&c->scene->grains.radius);
+  if (pack->gap <= -2 * radius)
+    wrong(c, "pack.gap", "puts grains on top of each other; accepted: a gap > -2 radius");
+}
+
+static void check_file(const checker *c) {
+  if (!named(c->scene->pack.method, "file") || !c->scene->pack.path)
+    return;
+  char *path = tal_scene_relative(c->scene, c->scene->pack.path);
+  char quoted[128], text[300];
+  struct stat info;
+  tal_quote(c->scene->pack.path, 120, quoted, sizeof quoted);
+  bool there = stat(path, &info) == 0, readable = there && !S_ISDIR(info.st_mode) && access(path, R_OK) == 0;
+  snprintf(text, sizeof text, "'%s' %s; accepted: a CSV file with columns x,y,r, relative to the scene file's folder",
+           quoted, there ? "cannot be read" : "does not exist");
+  if (!readable)
+    wrong(c, "pack.path", text);
+  free(path);
+}
+
+static void check_density(const checker *c) {
+  const tal_scene_grains *grains = &c->scene->grains;
+  size_t with_mass = 0;
+  const tal_node *list = tal_node_find(c->root, "grains.list");
+  for (const tal_node *item = list ? list->child : NULL; item; item = item->next)
+    with_mass += tal_node_get(item, "mass") != NULL;
+  bool needed = !list || with_mass < grains->list_count;
+  if (needed && !given(c, "material.density"))
+    missing(c, "material.density",
+            list ? "is missing, and not every listed grain has a mass; accepted: a number in kg/m^3 > 0"
+                 : "is missing; accepted: a number in kg/m^3 > 0");
+}
+
+static int64_t grain_total(const tal_scene *scene) {
+  if (scene->grains.list_count)
+    return (int64_t)scene->grains.list_count;
+  if (named(scene->pack.method, "lattice"))
+    return scene->pack.columns * scene->pack.rows;
+  return scene->grains.count;
+}
+
+static int ascending(const void *a, const void *b) {
+  int64_t x = *(const int64_t *)a, y = *(const int64_t *)b;
+  return (x > y) - (x < y);
+}
+
+static void check_tracks(const checker *c) {
+  const tal_scene_output *output = &c->scene->output;
+  int64_t total = grain_total(c->scene);
+  char text[160];
+  if (!output->track_count)
+    return;
+  int64_t *sorted = tal_grow(NULL, 0, output->track_count, sizeof *sorted);
+  memcpy(sorted, output->tracks, output->track_count * sizeof *sorted);
+  qsort(sorted, output->track_count, sizeof *sorted, ascending);
+  int64_t last = sorted[output->track_count - 1];
+  snprintf(text, sizeof text, "%lld is no grain; accepted: ids from 0 to %lld", (long long)last, (long long)total - 1);
+  if (total && last >= total)
+    wrong(c, "output.tracks", text);
+  for (size_t i = 1; i < output->track_count; i++) {
+    if (sorted[i] != sorted[i - 1])
+      continue;
+    snprintf(text, sizeof text, "%lld is listed twice; accepted: each id once", (long long)sorted[i]);
+    wrong(c, "output.tracks", text);
+    break;
+  }
+  free(sorted);
+}
+
+// ---- contacts ----
+
+static void check_normal(const checker *c) {
+  const tal_scene *scene = c->scene;
+  bool hertz = named(scene->contact.normal, "hertz"), linear = named(scene->contact.normal, "linear");
+  if (hertz && !given(c, "material.young"))
+    missing(c, "material.young", "is missing (normal: hertz); accepted: a number in Pa > 0");
+  if (linear && given(c, "contact.restitution") && given(c, "contact.damping"))
+    wrong(c, "contact.damping", "stands beside contact.restitution; accepted: one of the two");
+  if (linear && given(c, "material.damping") && scene->material.damping != 0)
+    wrong(c, "material.damping", "has no effect with normal: linear; accepted: contact.damping or contact.restitution");
+}
+
+// A stage of unknown kind may have one.
+static bool has_rate(const tal_scene *scene) {
+  for (size_t s = 0; s < scene->stage_count; s++)
+    if (!scene->stages[s].kind || named(scene->stages[s].kind, "compress"))
+      return true;
+  return false;
+}
+
+static void check_slip_speed(const checker *c) {
+  bool regularised = named(c->scene->contact.tangential, "regularised") && tal_scene_any_friction(c->scene);
+  if (regularised && !given(c, "contact.vR") && !has_rate(c->scene))
+    missing(c, "contact.vR", "is missing, and no stage has a rate to find it from; accepted: a number in m/s > 0");
+}
+
+// ---- walls, continuum ----
+
+static void check_wall(const checker *c, const tal_node *node, size_t w) {
+  const tal_scene_wall *wall = &c->scene->walls[w];
+  char key[64];
+  if (wall->from[0] == wall->to[0] && wall->from[1] == wall->to[1]) {
+    snprintf(key, sizeof key, "walls[%zu].to", w);
+    tal_report_add(c->report, node, key, "is where the wall starts; accepted: a second point");
+  }
+  if (wall->until_time <= wall->from_time) {
+    snprintf(key, sizeof key, "walls[%zu].until_time", w);
+    tal_report_add(c->report, node, key, "%g s is not after from_time %g s; accepted: a later time", wall->until_time,
+                   wall->from_time);
+  }
+}
+
+static void check_walls(const checker *c) {
+  const tal_node *list = tal_node_get(c->root, "walls");
+  const tal_node *node = list ? list->child : NULL;
+  for (size_t w = 0; w < c->scene->wall_count; w++, node = node->next)
+    check_wall(c, node, w);
+}
+
+static void check_refresh(const checker *c) {
+  const tal_node *refresh = tal_node_find(c->root, "continuum.refresh");
+  if (refresh && refresh->kind == TAL_NODE_MAP && refresh->count != 1)
+    wrong(c, "continuum.refresh", "needs one criterion; accepted: strain or displacement, or a whole number of steps");
+}
+
+void tal_scene_check(const tal_scene *scene, tal_node *root, tal_report *report) {
+  checker c = {scene, root, report};
+  check_source(&c);
+  check_radius(&c);
+  check_box(&c);
+  check_lattice(&c);
+  check_file(&c);
+  check_density(&c);
+  check_tracks(&c);
+  check_normal(&c);
+  check_slip_speed(&c);
+  check_walls(&c);
+  check_refresh(&c);
+}

@@ -1,0 +1,99 @@
+// Defaults that depend on other keys. What stays NAN here is found by the engine: thickness, vR, the tangential ratio,
+// the material's values on walls.
+#include "delaunay.h"
+#include "registry.h"
+#include "scene_check.h"
+#include "scene_schema.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *named(const char *name, size_t (*choices)(tal_choice *out, size_t capacity)) {
+  const tal_key key = {.choices = choices};
+  const char *found = NULL;
+  tal_key_choice(&key, name, &found);
+  return found;
+}
+
+bool tal_scene_any_friction(const tal_scene *scene) {
+  bool any = scene->material.friction > 0;
+  for (size_t w = 0; w < scene->wall_count; w++)
+    any = any || scene->walls[w].friction > 0;
+  for (size_t s = 0; s < scene->stage_count; s++)
+    any = any || scene->stages[s].friction > 0;
+  return any;
+}
+
+// A key of the regularised law or of the spring asks for that law.
+static void resolve_tangential(tal_scene *scene, tal_node *root) {
+  bool regularised =
+      tal_scene_any_friction(scene) || tal_node_find(root, "contact.exponent") || tal_node_find(root, "contact.vR");
+  const char *name = regularised ? "regularised" : "none";
+  if (tal_node_find(root, "contact.tangential_ratio"))
+    name = "spring";
+  if (!tal_node_find(root, "contact.tangential"))
+    scene->contact.tangential = named(name, tal_tangential_law_choices);
+}
+
+static void resolve_pack_method(tal_scene *scene, tal_node *root) {
+  bool list = tal_node_find(root, "grains.list"), count = tal_node_find(root, "grains.count");
+  if (tal_node_find(root, "pack.method") || (!list && !count))
+    return;
+  scene->pack.method = named(list ? "none" : "drop_and_roll", tal_packer_choices);
+}
+
+static void resolve_continuum(tal_scene *scene, tal_node *root) {
+  const geo_delaunay_backend *best = geo_delaunay_backend_find("cgal");
+  if (!best)
+    best = geo_delaunay_backend_find("qhull");
+  if (!tal_node_find(root, "continuum.backend") && best)
+    scene->continuum.backend = best->name;
+}
+
+static void resolve_stage_integrator(const tal_scene *scene, tal_scene_stage *stage, tal_node *node) {
+  tal_scene_integrator own = stage->integrator;
+  stage->integrator = scene->integrator;
+  if (own.scheme)
+    stage->integrator.scheme = own.scheme;
+  if (!isnan(own.dt))
+    stage->integrator.dt = own.dt;
+  if (tal_node_find(node, "integrator.force"))
+    stage->integrator.force = own.force;
+}
+
+static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report) {
+  const tal_node *list = tal_node_get(root, "stages");
+  tal_node *node = list ? list->child : NULL;
+  double pressure = nan("");
+  bool confined = false;
+  for (size_t s = 0; s < scene->stage_count; s++, node = node->next) {
+    tal_scene_stage *stage = &scene->stages[s];
+    const char *kind = stage->kind ? stage->kind : "";
+    stage->line = node->override ? 0 : node->line;
+    resolve_stage_integrator(scene, stage, node);
+    if (strcmp(kind, "confine") == 0) {
+      pressure = stage->pressure;
+      confined = true;
+      if (!tal_node_get(node, "timeout"))
+        stage->timeout = 20 * stage->ramp + 20;
+    }
+    if (strcmp(kind, "compress") != 0 || tal_node_get(node, "pressure"))
+      continue;
+    stage->pressure = pressure;
+    char key[64];
+    snprintf(key, sizeof key, "stages[%zu].pressure", s);
+    if (!confined)
+      tal_report_add(report, node, key,
+                     "is missing and no confine stage comes before; accepted: a number in Pa > 0, or a confine stage");
+  }
+}
+
+void tal_scene_resolve(tal_scene *scene, tal_node *root, tal_report *report) {
+  resolve_tangential(scene, root);
+  resolve_pack_method(scene, root);
+  resolve_continuum(scene, root);
+  resolve_stages(scene, root, report);
+  scene->contact.damping =
+      isnan(scene->contact.damping) && isnan(scene->contact.restitution) ? 0 : scene->contact.damping;
+}

@@ -1,0 +1,151 @@
+// The simulation: owns every part of a run. One step is in step.c; what a run is asked to do is in stage_*.c.
+#ifndef TAL_SIM_H
+#define TAL_SIM_H
+
+#include "contacts.h"
+#include "continuum.h"
+#include "grains.h"
+#include "neighbours.h"
+#include "pack.h"
+#include "scene.h"
+#include "walls.h"
+
+// Progress of a run: X(type, name, unit, meaning). All of it is kept in a checkpoint.
+#define TAL_RUN_FIELDS(X)                                                                                              \
+  X(int64_t, step, "1", "small steps taken since the start")                                                           \
+  X(double, time, "s", "simulated time")                                                                               \
+  X(int64_t, stage, "1", "index of the current stage; the number of stages when all are done")                        \
+  X(int64_t, stage_step, "1", "steps taken in this stage")                                                             \
+  X(double, stage_start, "s", "time at which this stage began")                                                        \
+  X(int64_t, stage_phase, "1", "what the stage is doing (its own numbering)")                                          \
+  X(int64_t, stage_begun, "1", "1 once the stage has set itself up")                                                   \
+  X(int64_t, force_evaluations, "1", "sweeps over the contacts that drove the motion")                                 \
+  X(int64_t, refresh_step, "1", "step of the last refresh of the graph")                                               \
+  X(double, refresh_strain, "1", "axial strain at the last refresh")                                                   \
+  X(double, refresh_area, "m^2", "area of the loop just after the last refresh")                                       \
+  X(int64_t, strain_begun, "1", "1 once the first compress has begun")                                                 \
+  X(double, log_volume, "1", "log of the area ratio over the finished refresh intervals since the first compress")     \
+  X(double, height0, "m", "distance of the plates when the first compress began")                                      \
+  X(double, axial_strain, "1", "engineering axial strain, compression positive")                                       \
+  X(double, pressure, "Pa", "pressure applied now on the loop")                                                        \
+  X(double, phase_time, "s", "time at which the current phase of the stage began")                                     \
+  X(double, impulse_time, "s", "start of the window over which mean forces are taken")                                 \
+  X(int64_t, arc_bottom_left, "1", "place on the loop where the left arc ends")                                        \
+  X(int64_t, arc_bottom_right, "1", "place on the loop where the right arc begins")                                    \
+  X(int64_t, arc_top_right, "1", "place on the loop where the right arc ends")                                         \
+  X(int64_t, arc_top_left, "1", "place on the loop where the left arc begins")                                         \
+  X(double, rest, "1", "mean unbalanced force over mean contact force, averaged over the last window")                 \
+  X(int64_t, stage_done, "1", "1 once the current stage has reached its end")                                          \
+  X(double, kinetic0, "J", "kinetic energy at the start")                                                              \
+  X(double, elastic0, "J", "elastic energy at the start")                                                              \
+  X(double, gravity0, "J", "potential energy of gravity at the start")
+
+typedef struct tal_run {
+#define X(type, name, unit, meaning) type name;
+  TAL_RUN_FIELDS(X)
+#undef X
+} tal_run;
+
+// One line of series.csv: X(name, unit, meaning); `step` and `stage` are written as whole numbers.
+#define TAL_SERIES_FIELDS(X)                                                                                           \
+  X(time, "s", "simulated time")                                                                                       \
+  X(step, "", "small steps since the start")                                                                           \
+  X(stage, "", "index of the stage, from 0")                                                                           \
+  X(axial_strain, "", "engineering, compression positive")                                                             \
+  X(volumetric_strain, "", "engineering, dilation positive, zero until the first compress")                            \
+  X(sigma_xx, "Pa", "stress of the assembly from contacts, compression positive")                                      \
+  X(sigma_yy, "Pa", "stress of the assembly from contacts")                                                            \
+  X(sigma_xy, "Pa", "stress of the assembly from contacts, symmetrised")                                               \
+  X(sigma_xx_boundary, "Pa", "the same from boundary forces")                                                          \
+  X(sigma_yy_boundary, "Pa", "the same from boundary forces")                                                          \
+  X(sigma_xy_boundary, "Pa", "the same from boundary forces, symmetrised")                                             \
+  X(sigma_xx_inertia, "Pa", "inertia part: sigma = boundary + inertia")                                                \
+  X(sigma_yy_inertia, "Pa", "inertia part")                                                                            \
+  X(sigma_xy_inertia, "Pa", "inertia part, symmetrised")                                                               \
+  X(stress_ratio, "", "sigma_yy / sigma_xx")                                                                           \
+  X(coordination, "", "2 contacts / grains, walls and plates not counted")                                             \
+  X(coordination_bearing, "", "the same without rattlers")                                                             \
+  X(solid_fraction, "", "grain area inside the loop over its area")                                                    \
+  X(fabric_xx, "", "contact fabric, mean of n (x) n")                                                                  \
+  X(fabric_xy, "", "contact fabric")                                                                                   \
+  X(fabric_yy, "", "contact fabric")                                                                                   \
+  X(mean_slip, "", "mean slip speed of touching pairs over vR")                                                        \
+  X(unbalanced, "", "mean unbalanced force over mean contact force")                                                   \
+  X(plate_bottom, "N", "force of the grains on the bottom plate, compression positive")                                \
+  X(plate_top, "N", "force of the grains on the top plate, compression positive")                                      \
+  X(kinetic, "J", "kinetic energy")                                                                                    \
+  X(elastic, "J", "elastic energy of contacts, tangential springs included")                                           \
+  X(gravity, "J", "potential energy of gravity")                                                                       \
+  X(work_walls, "J", "work done by plates and walls")                                                                  \
+  X(work_pressure, "J", "work done by the pressure on the loop")                                                       \
+  X(work_held, "J", "work done by what holds fixed grains and held spins")                                             \
+  X(dissipated_friction, "J", "energy lost to friction")                                                               \
+  X(dissipated_damping, "J", "energy lost to the viscous normal force")                                                \
+  X(energy_residual, "", "what the ledger does not close by, as a share of the total work")                            \
+  X(power_contacts, "W", "stress power of the cells")                                                                  \
+  X(power_boundary, "W", "power of boundary forces and inertia on the same cells")                                     \
+  X(dt_ratio, "", "time step over the critical one")                                                                   \
+  X(phi, "", "quasi-static coefficient [P 2.12, 2.B1] from the running state")                                         \
+  X(psi, "", "size coefficient 2R/L [P 2.14]")                                                                         \
+  X(overlap_max, "", "largest overlap over the smaller radius")
+
+typedef struct tal_row {
+#define X(name, unit, meaning) double name;
+  TAL_SERIES_FIELDS(X)
+#undef X
+} tal_row;
+
+typedef struct tal_sim tal_sim;
+
+// A normal or tangential contact law (law.c), an integrator (integrate.c), a boundary (boundary.c), a stage (stage.c).
+typedef struct tal_law tal_law;
+typedef struct tal_integrator tal_integrator;
+typedef struct tal_boundary tal_boundary;
+typedef struct tal_stage tal_stage;
+
+// Constants derived once from scene and packing.
+typedef struct tal_constants {
+  double mean_radius;   // [m] of the grains
+  double mean_mass;     // [kg] scaling included
+  double thickness;     // [m]
+  double vR;            // [m/s] NAN when no law needs it and no stage gives it
+  double modulus;       // [Pa] young / (1 - poisson^2) of the grains
+  double skin;          // [m]
+  double tangential_ratio; // k_t / k_n of the spring law
+} tal_constants;
+
+struct tal_sim {
+  const tal_scene *scene;       // borrowed
+  tal_constants constants;
+  tal_grains grains;
+  tal_contacts pairs;           // grain-grain slots
+  tal_contacts wall_contacts;   // grain-wall slots
+  tal_walls walls;
+  tal_neighbours neighbours;
+  tal_graph graph;
+  tal_run run;
+  const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
+  const tal_boundary *boundary; // what presses the loop now, NULL: nothing
+  double friction;              // [-] of grain-grain contacts now (a stage may change it)
+  double dt;                    // [s] of the current stage
+  unsigned effects;             // mask of effects.h that the hot loop pays for
+  double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
+};
+
+// Packs the scene and computes the first forces. *sim is NULL on failure.
+tal_status tal_sim_create(tal_sim **sim, const tal_scene *scene, tal_error *err);
+void tal_sim_free(tal_sim *sim);
+// One time step (and, where due, the stage's refresh of the graph). TAL_INVALID with the reason when the run went bad.
+tal_status tal_sim_step(tal_sim *sim, tal_error *err);
+// True when every stage is finished.
+bool tal_sim_done(const tal_sim *sim);
+// Forces of this instant with this instant's velocities into slots and rx, ry; changes nothing that the motion sees.
+tal_observed tal_sim_observe(tal_sim *sim);
+// The series line of this instant (observes first).
+void tal_sim_row(tal_sim *sim, tal_row *row);
+// After STATE fields, graph and run were put back: everything that follows from them.
+void tal_sim_restored(tal_sim *sim);
+// The stage being run or just finished; NULL for a scene without stages.
+const tal_scene_stage *tal_sim_stage(const tal_sim *sim);
+
+#endif

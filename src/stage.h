@@ -1,0 +1,24 @@
+// Stages: what a run is asked to do, one after the other. Constant descriptors, one registry line each in stage.c.
+#ifndef TAL_STAGE_H
+#define TAL_STAGE_H
+
+#include "registry.h"
+#include "sim.h"
+
+struct tal_stage {
+  const char *name;
+  const char *help;
+  bool uses_graph; // the graph is kept fresh during the stage; else it is built for output only
+  // Sets plates, pressure, friction, boundary. Forces are evaluated afterwards.
+  tal_status (*begin)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
+  // Before each step: pressure and wall velocities of the step.
+  void (*before_step)(tal_sim *sim, const tal_scene_stage *plan);
+  // After each step (and once after begin): sets run.stage_done, or fails with what was reached.
+  tal_status (*after_step)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
+};
+
+const tal_stage *tal_stage_find(const char *name);
+
+extern const tal_stage tal_stage_free, tal_stage_confine, tal_stage_compress;
+
+#endif

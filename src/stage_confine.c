@@ -1,0 +1,97 @@
+// Confinement, eqs (22)-(24): the pressure on the loop's arcs is ramped up, the plates follow under a force servo.
+// While the pressure rises the plates aim at the whole width of the loop, which beds the uneven top of a packing; then
+// at the width they really cover, which is what a uniform stress p asks for.
+// Ends when sigma_xx = sigma_yy = p within the tolerance and the assembly is at rest; fails, saying what was reached,
+// after the timeout. "At rest" looks at forces averaged over a window (the change of momentum across it): explicit
+// regularised friction chatters from step to step however still the grains are.
+#include "stage.h"
+
+#include "boundary.h"
+#include "plates.h"
+
+#include <string.h>
+
+enum { RAMP, HOLD };
+
+// Length of the window and of the blend from seating to holding, as shares of the ramp.
+static const double window_share = 0.025, blend_share = 0.25;
+
+static void open_window(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  memcpy(g->window_vx, g->vx, g->count * sizeof *g->vx);
+  memcpy(g->window_vy, g->vy, g->count * sizeof *g->vy);
+  sim->run.impulse_time = sim->run.time;
+}
+
+static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
+  (void)err;
+  tal_plates_ensure(sim);
+  sim->boundary = &tal_boundary_pressure;
+  sim->run.stage_phase = RAMP;
+  sim->run.pressure = 0;
+  sim->run.rest = INFINITY;
+  open_window(sim);
+  (void)plan;
+  return TAL_OK;
+}
+
+static double seating(const tal_sim *sim, const tal_scene_stage *plan) {
+  if (sim->run.stage_phase == RAMP) return 1;
+  return fmax(0, 1 - (sim->run.time - sim->run.phase_time) / (blend_share * plan->ramp));
+}
+
+static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
+  double elapsed = sim->run.time + sim->dt - sim->run.stage_start;
+  sim->run.pressure = plan->pressure * fmin(1, elapsed / plan->ramp);
+  double speed_limit = 0.1 * tal_plates_distance(sim) / plan->ramp;
+  tal_plates_servo(sim, sim->run.pressure, seating(sim, plan), speed_limit);
+}
+
+// Mean of m |dv| / window over the free grains, over the mean contact force of this instant.
+static void close_window(tal_sim *sim, const tal_macro *macro) {
+  const tal_grains *g = &sim->grains;
+  double sum = 0, window = sim->run.time - sim->run.impulse_time;
+  size_t free_grains = 0;
+  for (size_t i = 0; i < g->count; i++) {
+    if (g->inverse_mass[i] == 0) continue;
+    sum += g->mass[i] * hypot(g->vx[i] - g->window_vx[i], g->vy[i] - g->window_vy[i]) / window;
+    free_grains++;
+  }
+  sim->run.rest = sum / (double)(free_grains ? free_grains : 1) / macro->mean_force;
+  open_window(sim);
+}
+
+static bool near(double stress, double pressure, double tolerance) {
+  return fabs(stress - pressure) <= tolerance * pressure;
+}
+
+static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
+  tal_run *run = &sim->run;
+  double elapsed = run->time - run->stage_start;
+  if (run->stage_phase == RAMP && elapsed >= plan->ramp) {
+    run->stage_phase = HOLD;
+    run->phase_time = run->time;
+  }
+  if (run->time - run->impulse_time < window_share * plan->ramp * (1 - 1e-9)) return TAL_OK;
+  tal_observed seen = tal_sim_observe(sim);
+  tal_macro macro;
+  tal_macro_measure(&seen, &macro);
+  close_window(sim, &macro);
+  if (run->stage_phase == RAMP || seating(sim, plan) > 0) return TAL_OK;
+  run->stage_done = near(macro.stress.xx, plan->pressure, plan->tolerance) &&
+                    near(macro.stress.yy, plan->pressure, plan->tolerance) && run->rest <= plan->unbalanced;
+  if (run->stage_done || elapsed < plan->timeout) return TAL_OK;
+  return tal_fail(err, TAL_INVALID,
+                  "confine did not settle in %g s: sigma_xx = %.4g Pa, sigma_yy = %.4g Pa for a pressure of %.4g Pa "
+                  "(tolerance %g), unbalanced %.3g (asked: %g); a longer timeout or ramp, more damping or a looser "
+                  "tolerance may help",
+                  elapsed, macro.stress.xx, macro.stress.yy, plan->pressure, plan->tolerance, run->rest,
+                  plan->unbalanced);
+}
+
+const tal_stage tal_stage_confine = {.name = "confine",
+                                     .help = "isotropic confinement between plates, pressure on the sides",
+                                     .uses_graph = true,
+                                     .begin = begin,
+                                     .before_step = before_step,
+                                     .after_step = after_step};

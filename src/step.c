@@ -1,0 +1,214 @@
+// The algorithm of docs/method.md, chapter 4, in its order.
+#include "step.h"
+
+#include "boundary.h"
+#include "critical.h"
+#include "effects.h"
+#include "energy.h"
+#include "forces.h"
+#include "integrate.h"
+#include "law.h"
+#include "plates.h"
+#include "stage.h"
+#include "walls_load.h"
+
+#include <string.h>
+
+// Steps between two looks for a run gone bad.
+enum { INSPECT_EVERY = 100 };
+
+static bool any_spin(const tal_grains *g) {
+  for (size_t i = 0; i < g->count; i++)
+    if (g->omega[i] != 0) return true;
+  return false;
+}
+
+static bool any_held_motion(const tal_grains *g) {
+  for (size_t i = 0; i < g->count; i++) {
+    if (g->inverse_mass[i] == 0 && (g->vx[i] != 0 || g->vy[i] != 0)) return true;
+    if (g->inverse_inertia[i] == 0 && g->omega[i] != 0) return true;
+  }
+  return false;
+}
+
+static bool any_friction(const tal_sim *sim) {
+  if (sim->friction > 0) return true;
+  for (size_t w = 0; w < sim->walls.count; w++)
+    if (sim->walls.wall[w].friction > 0) return true;
+  return false;
+}
+
+static bool any_damping(const tal_sim *sim) {
+  const tal_scene_contact *law = &sim->scene->contact;
+  if (tal_normal_law_find(law->normal)->effects & TAL_EFFECT_HERTZ) return sim->scene->material.damping > 0;
+  return law->restitution < 1 || law->damping > 0;
+}
+
+void tal_step_effects(tal_sim *sim) {
+  const tal_scene *scene = sim->scene;
+  unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
+  if (any_damping(sim)) effects |= TAL_EFFECT_DAMPING;
+  if (any_friction(sim)) effects |= tal_tangential_law_find(scene->contact.tangential)->effects;
+  if ((scene->rotation && (effects & TAL_EFFECT_FRICTION)) || any_spin(&sim->grains)) effects |= TAL_EFFECT_SPIN;
+  if (scene->gravity[0] != 0 || scene->gravity[1] != 0) effects |= TAL_EFFECT_GRAVITY;
+  if (sim->boundary) effects |= TAL_EFFECT_BOUNDARY;
+  if (sim->walls.count) effects |= TAL_EFFECT_WALLS;
+  if (any_held_motion(&sim->grains)) effects |= TAL_EFFECT_HELD;
+  sim->effects = effects;
+}
+
+// The observed forces of this instant drive the first half kick of what follows.
+static void drive_with_observed(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++) {
+    g->fx[i] = g->rx[i] + g->mass[i] * sim->scene->gravity[0];
+    g->fy[i] = g->ry[i] + g->mass[i] * sim->scene->gravity[1];
+    g->torque[i] = g->rtorque[i];
+  }
+}
+
+static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
+  sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
+  for (size_t w = 0; w < sim->walls.count; w++)
+    if (sim->walls.wall[w].plate != 0) sim->walls.wall[w].friction = sim->friction;
+}
+
+static tal_status check_step(const tal_sim *sim, tal_error *err) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  double critical = tal_critical_step(sim);
+  if (plan->integrator.force || sim->dt <= critical) return TAL_OK;
+  return tal_fail(err, TAL_INVALID,
+                  "integrator.dt = %g s is above the critical step %.4g s of the contacts at t = %g s (stage %d, %s); "
+                  "a smaller dt, or integrator.force: true at your own risk",
+                  sim->dt, critical, sim->run.time, (int)sim->run.stage, plan->kind);
+}
+
+tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  tal_run *run = &sim->run;
+  if (sim->stage) { // the instant between two stages counts half in each
+    tal_sim_observe(sim);
+    tal_energy_credit(sim, -0.5 * sim->dt);
+  }
+  sim->stage = tal_stage_find(plan->kind);
+  sim->dt = plan->integrator.dt;
+  run->stage_step = 0;
+  run->stage_start = run->time;
+  run->stage_done = 0;
+  run->stage_begun = 1;
+  tal_status status = sim->stage->begin(sim, plan, err);
+  if (status) return status;
+  set_friction(sim, plan);
+  tal_step_effects(sim);
+  tal_neighbours_rebuild(sim);
+  tal_sim_observe(sim);
+  if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err))) return status;
+  tal_sim_observe(sim);
+  tal_walls_take_loads(sim, 0);
+  tal_energy_credit(sim, 0.5 * sim->dt);
+  drive_with_observed(sim);
+  run->force_evaluations++;
+  if ((status = tal_step_inspect(sim, err))) return status;
+  if ((status = check_step(sim, err))) return status;
+  return sim->stage->after_step(sim, plan, err);
+}
+
+bool tal_step_keeps_graph(const tal_sim *sim) {
+  return sim->stage && (sim->stage->uses_graph || sim->run.strain_begun);
+}
+
+tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
+  tal_run *run = &sim->run;
+  tal_grains *g = &sim->grains;
+  if (run->strain_begun && sim->graph.valid && run->refresh_area > 0)
+    run->log_volume += log(geo_loop_area(&sim->graph.loop, g->x, g->y) / run->refresh_area);
+  tal_status status = tal_graph_refresh(&sim->graph, g, err);
+  if (status) return status;
+  run->refresh_area = geo_loop_area(&sim->graph.loop, g->x, g->y);
+  run->refresh_step = run->step;
+  run->refresh_strain = run->axial_strain;
+  if (sim->boundary) sim->boundary->refreshed(sim);
+  return TAL_OK;
+}
+
+static double largest_displacement_since_refresh(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  double largest = 0;
+  for (size_t i = 0; i < g->count; i++) {
+    double dx = g->x[i] - sim->graph.x[i], dy = g->y[i] - sim->graph.y[i];
+    largest = fmax(largest, dx * dx + dy * dy);
+  }
+  return sqrt(largest);
+}
+
+static bool refresh_due(const tal_sim *sim) {
+  const tal_scene_continuum *plan = &sim->scene->continuum;
+  int64_t steps = sim->run.step - sim->run.refresh_step;
+  if (plan->refresh_steps > 0) return steps >= plan->refresh_steps;
+  if (!isnan(plan->refresh_strain) && sim->run.axial_strain - sim->run.refresh_strain >= plan->refresh_strain)
+    return true;
+  // displacement is looked at every tenth step only; with a strain it is the confinement's criterion
+  double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;
+  if (steps % 10 || (!isnan(plan->refresh_strain) && sim->run.strain_begun)) return false;
+  return largest_displacement_since_refresh(sim) >= limit * 2 * sim->constants.mean_radius;
+}
+
+tal_status tal_step_inspect(const tal_sim *sim, tal_error *err) {
+  const tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++)
+    if (!(fabs(g->x[i]) < 1e150 && fabs(g->y[i]) < 1e150 && fabs(g->vx[i]) < 1e150 && fabs(g->vy[i]) < 1e150 &&
+          fabs(g->omega[i]) < 1e150))
+      return tal_fail(err, TAL_INVALID,
+                      "grain %lld has no finite position or velocity at t = %g s; the time step is probably too large",
+                      (long long)g->id[i], sim->run.time);
+  int64_t grain;
+  double overlap = tal_largest_overlap(sim, &grain);
+  if (overlap > sim->scene->overlap_limit)
+    return tal_fail(err, TAL_INVALID,
+                    "grain %lld overlaps by %.3g of the smaller radius at t = %g s (limits.overlap: %g); contacts too "
+                    "soft, a step too large or an impact too fast",
+                    (long long)grain, overlap, sim->run.time, sim->scene->overlap_limit);
+  for (int side = 1; side >= -1; side -= 2) {
+    const tal_wall *plate = tal_walls_plate(&sim->walls, side);
+    for (size_t i = 0; plate && i < g->count; i++)
+      if (side * (g->y[i] - plate->y0) < -g->r[i])
+        return tal_fail(err, TAL_INVALID, "grain %lld was lost through a plate at t = %g s", (long long)g->id[i],
+                        sim->run.time);
+  }
+  return TAL_OK;
+}
+
+// Passes over finished stages; false with TAL_OK when all are done.
+static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
+  *more = false;
+  while (!tal_sim_done(sim)) {
+    if (sim->run.stage_begun && !sim->run.stage_done) {
+      *more = true;
+      return TAL_OK;
+    }
+    if (sim->run.stage_done) sim->run.stage++;
+    tal_status status = tal_step_begin_stage(sim, err);
+    if (status) return status;
+  }
+  return TAL_OK;
+}
+
+tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
+  bool more;
+  tal_status status = enter_stage(sim, &more, err);
+  if (status || !more) return status;
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  tal_run *run = &sim->run;
+  sim->stage->before_step(sim, plan); // pressure and wall velocities of the step (22)-(25)
+  run->step++;
+  run->stage_step++;
+  run->time = run->stage_start + (double)run->stage_step * sim->dt;
+  tal_integrator_find(plan->integrator.scheme)->advance(sim); // (12)-(17)
+  run->force_evaluations++;
+  if (run->step % INSPECT_EVERY == 0) {
+    if ((status = tal_step_inspect(sim, err))) return status;
+    if ((status = check_step(sim, err))) return status;
+  }
+  if (tal_step_keeps_graph(sim) && refresh_due(sim) && (status = tal_step_refresh(sim, err))) return status;
+  return sim->stage->after_step(sim, plan, err);
+}

@@ -1,0 +1,19 @@
+// One time step of a run, and the passage from stage to stage.
+#ifndef TAL_STEP_H
+#define TAL_STEP_H
+
+#include "sim.h"
+
+// Finds the effects that the scene calls for now (effects.h) and writes them into sim->effects.
+void tal_step_effects(tal_sim *sim);
+// Sets up the stage run.stage: its friction, plates, boundary, graph and first forces.
+tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err);
+// True when the graph is part of the run now (a stage that acts on it, or strain being integrated over it).
+bool tal_step_keeps_graph(const tal_sim *sim);
+// Fresh graph; accumulates the volumetric strain over the interval that ends.
+tal_status tal_step_refresh(tal_sim *sim, tal_error *err);
+// Looks for a run gone bad: coordinates that are no numbers, overlaps beyond the limit, lost grains, a step above the
+// critical one.
+tal_status tal_step_inspect(const tal_sim *sim, tal_error *err);
+
+#endif

@@ -1,0 +1,43 @@
+#include "walls.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+void tal_walls_init(tal_walls *walls) { *walls = (tal_walls){0}; }
+
+void tal_walls_clear(tal_walls *walls) {
+  free(walls->wall);
+  *walls = (tal_walls){0};
+}
+
+tal_wall *tal_walls_add(tal_walls *walls) {
+  if (walls->count == walls->capacity) {
+    walls->wall = tal_grow(walls->wall, walls->capacity, walls->capacity * 2 + 4, sizeof *walls->wall);
+    walls->capacity = walls->capacity * 2 + 4;
+  }
+  tal_wall *wall = &walls->wall[walls->count++];
+  *wall = (tal_wall){.from_time = -INFINITY, .until_time = INFINITY};
+  return wall;
+}
+
+tal_wall *tal_walls_plate(const tal_walls *walls, int side) {
+  for (size_t w = 0; w < walls->count; w++)
+    if (walls->wall[w].plate == side) return &walls->wall[w];
+  return NULL;
+}
+
+bool tal_wall_active(const tal_wall *wall, double time) { return time >= wall->from_time && time < wall->until_time; }
+
+tal_wall_point tal_wall_nearest(const tal_wall *wall, double x, double y) {
+  if (wall->plate != 0) return (tal_wall_point){0, wall->plate, (y - wall->y0) * wall->plate};
+  double dx = wall->x1 - wall->x0, dy = wall->y1 - wall->y0;
+  double along = ((x - wall->x0) * dx + (y - wall->y0) * dy) / (dx * dx + dy * dy);
+  along = along < 0 ? 0 : along > 1 ? 1 : along;
+  double ex = x - (wall->x0 + along * dx), ey = y - (wall->y0 + along * dy);
+  double distance = sqrt(ex * ex + ey * ey);
+  if (distance == 0) { // on the line itself: any of the two sides
+    double length = sqrt(dx * dx + dy * dy);
+    return (tal_wall_point){-dy / length, dx / length, 0};
+  }
+  return (tal_wall_point){ex / distance, ey / distance, distance};
+}
