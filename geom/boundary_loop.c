@@ -48,7 +48,7 @@ typedef struct peeler {
   const double *x, *y, *radius;
   double gap_limit;
   unsigned char *inside;  // [T] borrowed
-  unsigned char *on_loop; // [points]
+  unsigned char *on_loop; // [points] is or was on the loop; no triangle inside asks about those that left it
   wide_edge *heap;        // widest on top
   size_t count, capacity;
 } peeler;
@@ -123,16 +123,11 @@ static bool may_remove(const peeler *p, int32_t t, int k) {
 }
 
 static void remove_triangle(peeler *p, int32_t t) {
-  bool outer[3];
-  for (int m = 0; m < 3; m++)
-    outer[m] = is_outer(p, t, m);
   p->inside[t] = 0;
   for (int m = 0; m < 3; m++) {
-    if (outer[(m + 1) % 3] && outer[(m + 2) % 3])
-      p->on_loop[p->mesh->corner[t][m]] = 0; // the ear's tip
-    if (outer[m])
-      continue;
     int32_t u = p->mesh->neighbour[t][m];
+    if (u < 0 || !p->inside[u])
+      continue;
     int k = p->mesh->neighbour[u][0] == t ? 0 : p->mesh->neighbour[u][1] == t ? 1 : 2;
     expose(p, u, k);
   }

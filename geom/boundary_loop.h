@@ -9,7 +9,7 @@ typedef struct geo_loop {
   size_t count;          // B
   size_t capacity;       // allocated nodes
   int32_t *node;         // owned; [B] point indices, counter-clockwise, starting at the smallest index
-  size_t outside_count;  // points of the mesh left outside the loop
+  size_t outside_count;  // points of the mesh left outside the loop (hidden ones are no points of the mesh)
   size_t triangle_count; // triangles inside the loop
 } geo_loop;
 
@@ -20,7 +20,8 @@ void geo_loop_set(geo_loop *loop, const int32_t *node, size_t count);
 
 // Peels: a boundary triangle is removed while its outer edge (i,j) has a gap |ij| - radius_i - radius_j > gap_limit
 // [length] and the removal keeps the boundary one simple loop. Longest gap first, ties by point index, so the result
-// does not depend on the order of triangles. A point whose triangles are all removed lies outside.
+// does not depend on the order of triangles. A triangle with two outer edges goes only if both are that wide: then its
+// tip lies outside. Where only a triangle holds two parts together it stays, however wide.
 // inside[T]: set to 1 for kept triangles. Returns 0, or -1 when no triangle would be left (loop->count = 0).
 int geo_loop_peel(geo_loop *loop, const geo_mesh *mesh, const double *x, const double *y, const double *radius,
                   double gap_limit, unsigned char *inside);

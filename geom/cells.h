@@ -13,9 +13,9 @@ typedef struct geo_pairs {
 void geo_pairs_init(geo_pairs *pairs);
 void geo_pairs_clear(geo_pairs *pairs);
 
-// All pairs i < j with |x_i - x_j| < r_i + r_j + margin [length], sorted by (i, j). Memory O(n) whatever the extent
-// (far-flung points share buckets by hashing or a capped grid); sizes may differ by 100 without quadratic cost. Returns
-// 0, or -1 when a coordinate is not finite.
+// All pairs i < j with |x_i - x_j| < r_i + r_j + margin [length] (compared as squares), sorted by (i, j). The margin
+// may be negative. Memory O(n) whatever the extent; sizes may differ by 100 and more without quadratic cost. Returns 0,
+// or -1 and no pairs when a number is not finite.
 int geo_cells_pairs(const double *x, const double *y, const double *r, size_t n, double margin, geo_pairs *pairs);
 
 #endif

@@ -25,7 +25,8 @@ typedef struct geo_delaunay_report {
 typedef struct geo_delaunay_backend {
   const char *name; // "cgal", "qhull"
   const char *help;
-  // `weight` is NULL for plain, else squared radii [length^2]. Coordinates are already centred.
+  // Fills `mesh` with a candidate, which geo_delaunay then makes exact and canonical. `weight` is NULL for plain, else
+  // squared radii [length^2]. Coordinates are already centred and scaled to a size of about 1, weights likewise.
   geo_delaunay_result (*build)(const double *x, const double *y, const double *weight, size_t n, geo_mesh *mesh,
                                geo_delaunay_report *report);
 } geo_delaunay_backend;

@@ -1,6 +1,7 @@
 // Pressure on the Delaunay boundary, eq (22) [P 2.5, 3.2]: each edge of the loop carries p h times its length along the
 // inward normal, half to each end. On a closed loop that is a force and moment free system of uniform stress p.
-// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest.
+// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest. While
+// the plates bed a packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
 #include "boundary.h"
 
 #include <stdlib.h>
@@ -31,12 +32,28 @@ static void plate_ends(const tal_sim *sim, int side, unsigned char *mark, int64_
   if (*left < 0) *left = *right = nearest;
 }
 
+// Loop places furthest out along the diagonals on the plate's side.
+static void corners(const tal_sim *sim, int side, int64_t *left, int64_t *right) {
+  const geo_loop *loop = &sim->graph.loop;
+  const tal_grains *g = &sim->grains;
+  *left = *right = 0;
+  for (int64_t k = 0; k < (int64_t)loop->count; k++) {
+    int32_t i = loop->node[k], l = loop->node[*left], r = loop->node[*right];
+    if (-g->x[i] - side * g->y[i] > -g->x[l] - side * g->y[l]) *left = k;
+    if (g->x[i] - side * g->y[i] > g->x[r] - side * g->y[r]) *right = k;
+  }
+}
+
 static void refreshed(tal_sim *sim) {
   tal_grains *g = &sim->grains;
-  memset(g->bx, 0, g->count * sizeof *g->bx);
-  memset(g->by, 0, g->count * sizeof *g->by);
+  sim->boundary_moved = true;
   if (!tal_walls_plate(&sim->walls, +1) || !tal_walls_plate(&sim->walls, -1)) {
     sim->run.arc_bottom_left = sim->run.arc_bottom_right = sim->run.arc_top_right = sim->run.arc_top_left = 0;
+    return;
+  }
+  if (sim->run.bedding) {
+    corners(sim, +1, &sim->run.arc_bottom_left, &sim->run.arc_bottom_right);
+    corners(sim, -1, &sim->run.arc_top_left, &sim->run.arc_top_right);
     return;
   }
   unsigned char *mark = tal_alloc(g->count, 1);
@@ -72,6 +89,11 @@ static void apply(tal_sim *sim) {
   const geo_loop *loop = &sim->graph.loop;
   const tal_run *run = &sim->run;
   tal_grains *g = &sim->grains;
+  if (sim->boundary_moved) { // grains that left the loop keep their last force until the forces are evaluated anew
+    memset(g->bx, 0, g->count * sizeof *g->bx);
+    memset(g->by, 0, g->count * sizeof *g->by);
+    sim->boundary_moved = false;
+  }
   for (size_t k = 0; k < loop->count; k++) g->bx[loop->node[k]] = g->by[loop->node[k]] = 0;
   if (!tal_walls_plate(&sim->walls, +1)) {
     press_arc(sim, 0, loop->count);

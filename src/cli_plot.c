@@ -3,6 +3,8 @@
 
 #include "figures.h"
 
+#include <signal.h>
+
 static void print_path(void *user, const char *path) {
   fprintf(user, "%s\n", path);
   fflush(user);
@@ -13,6 +15,7 @@ int tal_cli_plot(int argc, char **argv) {
   int exit_code;
   if (!tal_cli_options_parse(&options, "plot", 0, "DIR", argc, argv, &exit_code))
     return exit_code;
+  signal(SIGINT, SIG_IGN); // Ctrl-C ends gnuplot, which comes back as TAL_INTERRUPTED with the temporary files removed
   tal_error err;
   int count;
   tal_status status = tal_figures_draw_each(options.argument, print_path, stdout, &count, &err);

@@ -16,6 +16,7 @@ static const tal_figure *const figures[] = {
     &tal_figure_energy,            //
     &tal_figure_fabric,            //
     &tal_figure_grains_first,      //
+    &tal_figure_grains_confined,   //
     &tal_figure_grains_last,       //
     &tal_figure_displacement,      //
     &tal_figure_rotation,          //

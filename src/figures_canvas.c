@@ -6,7 +6,7 @@
 
 enum { BOX_WIDTH = 1250, BOX_HEIGHT = 1500, LEAST_BOX = 420, LEAST_CANVAS = 1000, FONT = 24, NAME_LIMIT = 40 };
 
-static void map_include(tal_map *m, double x, double y, double r) {
+void tal_map_include(tal_map *m, double x, double y, double r) {
   if (!isfinite(x) || !isfinite(y) || !isfinite(r))
     return;
   m->x0 = fmin(m->x0, x - r);
@@ -18,7 +18,7 @@ static void map_include(tal_map *m, double x, double y, double r) {
 tal_map tal_map_of_frame(const tal_frame *frame) {
   tal_map m = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL, .top = 0};
   for (size_t k = 0; k < frame->grain_count; k++)
-    map_include(&m, frame->x[k], frame->y[k], frame->r[k]);
+    tal_map_include(&m, frame->x[k], frame->y[k], frame->r[k]);
   if (!(m.x1 > m.x0))
     m.x0 = m.y0 = 0, m.x1 = m.y1 = 1e-3;
   return m;
@@ -52,7 +52,8 @@ double tal_map_line_height(const tal_map *m, int line) {
 }
 
 static void heading_position(const tal_map *m, tal_plot *plot, int line) {
-  fprintf(plot->script, " at screen 0.5, screen %.5f center front ", tal_map_line_height(m, line));
+  fprintf(plot->script, " at screen %.5f, screen %.5f center front ", (m->left + 0.5 * m->box_width) / m->width,
+          tal_map_line_height(m, line));
 }
 
 void tal_map_open(const tal_map *m, const tal_figure_data *data, tal_plot *plot) {
@@ -66,7 +67,8 @@ void tal_map_open(const tal_map *m, const tal_figure_data *data, tal_plot *plot)
   double step =
       1e3 * tal_plot_tick_step(1 / m->scale, 1.0 / 170); // about 170 px from tick to tick, the same on both axes
   fprintf(out, "set xtics %.9g\nset ytics %.9g\n", step, step);
-  fputs("unset key\nset border 15 lw 2 lc rgb '#606060'\nset tics nomirror out textcolor rgb '#000000'\n"
+  fputs("set format '%h'\nunset key\nset clip two\nset border 15 lw 2 lc rgb '#606060'\nset tics nomirror out "
+        "textcolor rgb '#000000'\n"
         "set xlabel 'x (mm)'\nset ylabel 'y (mm)'\nset label 1 ",
         out);
   tal_plot_text(out, data->facts.name, NAME_LIMIT);

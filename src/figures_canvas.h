@@ -14,6 +14,8 @@ typedef struct tal_map {
 
 // The range of the frame's grains. Grains alone set it, so that a wall without end does not shrink them.
 tal_map tal_map_of_frame(const tal_frame *frame);
+// Widens the range to a disc. What is not finite does not count.
+void tal_map_include(tal_map *m, double x, double y, double r);
 // Fixes scale and canvas for `lines` lines of heading above the box, with room for a colour bar on its right.
 void tal_map_fit(tal_map *m, int lines, bool colour_bar);
 // Height of heading line `line` in gnuplot's screen coordinates.

@@ -111,7 +111,8 @@ static void curves_draw(const curves *set, tal_plot *plot, const char *name) {
 // Canvas, axes and the scene's name at the top. The frame leaves room below the name for a key of one line.
 static void open_canvas(tal_plot *plot, const tal_figure_data *data, int width, int height) {
   tal_plot_canvas(plot, width, height, CURVE_FONT);
-  fputs("set border 3 lw 2\nset tics nomirror out\nset grid lw 1.5 lc rgb '#dddddd' dt 1\nset key noautotitle\n"
+  fputs("set format '%h'\nset border 3 lw 2\nset tics nomirror out\nset grid lw 1.5 lc rgb '#dddddd' dt 1\nset key "
+        "noautotitle\n"
         "set label 1 ",
         plot->script);
   tal_plot_text(plot->script, data->facts.name, NAME_LIMIT);
@@ -217,7 +218,7 @@ static void draw_residual(curves *residual, tal_plot *plot, const char *x_label)
   fprintf(plot->script, "unset label 1\nset xlabel '%s'\nset ylabel \"residual / work", x_label);
   if (power)
     fprintf(plot->script, "\\n(10^{%d})", power);
-  fputs("\"\nset format x '%g'\nset tmargin at screen 0.33\nset bmargin at screen 0.11\n", plot->script);
+  fputs("\"\nset format x '%h'\nset tmargin at screen 0.33\nset bmargin at screen 0.11\n", plot->script);
   double low = HUGE_VAL, high = -HUGE_VAL;
   for (size_t row = residual->begin; row < residual->end; row++) {
     low = fmin(low, residual->y[0][row] * residual->scale[0]);
@@ -281,7 +282,7 @@ static void draw_fabric(const tal_figure_data *data, tal_plot *plot) {
         plot->script);
   curves_write(&upper, plot, "upper");
   curves_draw(&upper, plot, "upper");
-  fprintf(plot->script, "unset label 1\nset format x '%%g'\nset xlabel '%s'\nset ylabel 'solid fraction'\n", x_label);
+  fprintf(plot->script, "unset label 1\nset format x '%%h'\nset xlabel '%s'\nset ylabel 'solid fraction'\n", x_label);
   fputs("set tmargin at screen 0.49\nset bmargin at screen 0.12\n", plot->script);
   curves_write(&lower, plot, "lower");
   curves_draw(&lower, plot, "lower");

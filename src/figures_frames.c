@@ -101,11 +101,30 @@ static void read_grains(reading *in, tal_frame *frame) {
   frame->theta = read_reals(in, "/grains", "/grains/theta", n);
 }
 
+// Contacts whose overlap is round-off of the coordinates (a packing that rests on nothing but geometry) carry forces
+// that mean nothing; they are left out.
+static void drop_hairs(tal_frame *frame, const double *overlap) {
+  size_t kept = 0;
+  for (size_t c = 0; c < frame->contact_count; c++) {
+    double least = fmin(frame->r[frame->i[c]], frame->r[frame->j[c]]);
+    if (overlap[c] < 1e-10 * least)
+      continue;
+    frame->i[kept] = frame->i[c];
+    frame->j[kept] = frame->j[c];
+    frame->fn[kept++] = frame->fn[c];
+  }
+  frame->contact_count = kept;
+}
+
 static void read_contacts(reading *in, tal_frame *frame) {
   size_t n = frame->contact_count = extent(in->file, "/contacts/i", "/contacts");
   frame->i = read_indices(in, "/contacts", "/contacts/i", n, frame->grain_count);
   frame->j = read_indices(in, "/contacts", "/contacts/j", n, frame->grain_count);
   frame->fn = read_reals(in, "/contacts", "/contacts/fn", n);
+  double *overlap = read_reals(in, "/contacts", "/contacts/overlap", n);
+  if (!in->failed)
+    drop_hairs(frame, overlap);
+  free(overlap);
 }
 
 static void read_cells(reading *in, tal_frame *frame) {

@@ -21,7 +21,7 @@ typedef struct tal_frame {
   size_t grain_count;
   int64_t *id;               // owned; [grain_count] ascending
   double *x, *y, *r, *theta; // owned; [grain_count] [m], [rad]
-  size_t contact_count;      // grain-grain
+  size_t contact_count;      // grain-grain, overlap beyond round-off
   int64_t *i, *j;            // owned; [contact_count] grain indices
   double *fn;                // owned; [contact_count] normal force [N]
   size_t wall_count;         // walls and plates there at this time

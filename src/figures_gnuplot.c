@@ -183,23 +183,25 @@ static int wait_for(pid_t child, double limit, bool *expired) {
   return got < 0 ? -1 : result;
 }
 
-// The line of gnuplot's output that says what is wrong, else its last line.
-static void read_complaint(const tal_plot *plot, char *text, size_t size) {
+// The line of gnuplot's output that says what is wrong, else its last line. False when it said nothing.
+static bool read_complaint(const tal_plot *plot, char *text, size_t size) {
   char *path = tal_path_join(plot->folder, "log"), line[512];
   FILE *log = fopen(path, "r");
-  bool found = false;
+  bool found = false, spoke = false;
   snprintf(text, size, "no reason given");
   while (log && !found && fgets(line, sizeof line, log)) {
     line[strcspn(line, "\r\n")] = 0;
     char *start_of_text = line + strspn(line, " \t^");
     if (!*start_of_text)
       continue;
+    spoke = true;
     found = strstr(line, "line ") && !strstr(line, "warning");
     snprintf(text, size, "%s", start_of_text);
   }
   if (log)
     fclose(log);
   free(path);
+  return spoke;
 }
 
 // A whole PNG begins with its signature and ends with an IEND chunk.
@@ -216,9 +218,11 @@ static bool is_whole_png(const char *path) {
 
 static tal_status judge(const tal_plot *plot, int result, const char *png, tal_error *err) {
   char complaint[400];
-  if (WIFSIGNALED(result) && (WTERMSIG(result) == SIGINT || WTERMSIG(result) == SIGTERM))
+  bool spoke = read_complaint(plot, complaint, sizeof complaint);
+  // gnuplot catches SIGINT and then ends with a failure but without a word.
+  bool caught = WIFEXITED(result) && WEXITSTATUS(result) && !spoke;
+  if (caught || (WIFSIGNALED(result) && (WTERMSIG(result) == SIGINT || WTERMSIG(result) == SIGTERM)))
     return tal_fail(err, TAL_INTERRUPTED, "stopped while drawing %s", png);
-  read_complaint(plot, complaint, sizeof complaint);
   if (!WIFEXITED(result) || WEXITSTATUS(result))
     return tal_fail(err, TAL_IO, "%s: gnuplot failed: %s", png, complaint);
   char *made = tal_path_join(plot->folder, "figure.png");

@@ -56,6 +56,14 @@ static size_t window_begin(const tal_frame_list *frames) {
   return frames->entry[best].axial_strain < end ? best : 0;
 }
 
+// The latest unstrained frame when a strained one follows; 0 when there is none.
+static size_t confined_frame(const tal_frame_list *frames) {
+  for (size_t k = 0; k + 1 < frames->count; k++)
+    if (!(frames->entry[k].axial_strain > 0) && frames->entry[k + 1].axial_strain > 0)
+      return k;
+  return 0;
+}
+
 // Pairs the grains of two frames by id; both lists ascend.
 static void pair_grains(tal_window *window, const tal_frame *a, const tal_frame *b) {
   size_t most = a->grain_count < b->grain_count ? a->grain_count : b->grain_count;
@@ -91,6 +99,9 @@ static tal_status read_frames(tal_figure_data *data, const char *dir, tal_error 
   if (count == 1)
     return status;
   keep_first(&status, err, tal_frame_read(&data->first, data->frames.entry[0].path, &text), &text);
+  size_t confined = confined_frame(&data->frames);
+  if (confined > 0)
+    keep_first(&status, err, tal_frame_read(&data->confined, data->frames.entry[confined].path, &text), &text);
   const char *begin = data->frames.entry[window_begin(&data->frames)].path;
   keep_first(&status, err, tal_frame_read(&data->earlier, begin, &text), &text);
   pair_grains(&data->window, &data->earlier, &data->last);
@@ -151,6 +162,7 @@ void tal_figure_data_clear(tal_figure_data *data) {
   tal_table_clear(&data->series);
   tal_frame_list_clear(&data->frames);
   tal_frame_clear(&data->first);
+  tal_frame_clear(&data->confined);
   tal_frame_clear(&data->last);
   tal_frame_clear(&data->earlier);
   window_clear(&data->window);

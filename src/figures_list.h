@@ -32,7 +32,9 @@ typedef struct tal_figure_data {
   size_t strain_begin; // first row of the compression; `rows` when there is none
   size_t confine_begin, confine_end;
   tal_frame_list frames;
-  tal_frame first, last, earlier; // `earlier` begins the window that ends with `last`; grain_count 0: no such frame
+  // grain_count 0: no such frame, or the same as `last`. `confined` is the latest unstrained one of a compressed run
+  // unless that is the first; `earlier` begins the window that ends with `last`.
+  tal_frame first, confined, earlier, last;
   tal_window window;
   unsigned offers; // mask of what the run can meet
 } tal_figure_data;
@@ -51,7 +53,7 @@ typedef struct tal_figure {
 
 extern const tal_figure tal_figure_confinement, tal_figure_stress_ratio, tal_figure_volumetric_strain,
     tal_figure_mean_slip, tal_figure_energy, tal_figure_fabric;
-extern const tal_figure tal_figure_grains_first, tal_figure_grains_last, tal_figure_displacement, tal_figure_rotation,
-    tal_figure_cells_L_II, tal_figure_cells_pressure;
+extern const tal_figure tal_figure_grains_first, tal_figure_grains_confined, tal_figure_grains_last,
+    tal_figure_displacement, tal_figure_rotation, tal_figure_cells_L_II, tal_figure_cells_pressure;
 
 #endif

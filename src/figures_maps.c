@@ -63,13 +63,17 @@ static void draw_chains(const tal_frame *frame, tal_plot *plot, double mean, dou
 
 static void draw_grains(const tal_figure_data *data, const tal_frame *frame, tal_plot *plot) {
   char state[64];
+  if (frame->grain_count == 0) {
+    plot->empty = true;
+    return;
+  }
   tal_map m = tal_map_of_frame(frame);
   double mean = mean_of(frame->fn, frame->contact_count), diameter = 2 * mean_of(frame->r, frame->grain_count);
   bool forces = mean > 0;
   tal_map_fit(&m, forces ? 3 : 2, false);
   tal_map_open(&m, data, plot);
   tal_map_state(data, frame, state);
-  tal_map_heading(&m, plot, 1, "contact forces, %s", state);
+  tal_map_heading(&m, plot, 1, "%s, %s", forces ? "contact forces" : "grains", state);
   if (forces)
     tal_map_heading(&m, plot, 2, "line width ∝ f_n,  ⟨f_n⟩ = %.3g N", mean);
   draw_discs(frame, plot);
@@ -81,10 +85,11 @@ static void draw_grains(const tal_figure_data *data, const tal_frame *frame, tal
 }
 
 static void draw_grains_first(const tal_figure_data *data, tal_plot *plot) {
-  if (data->first.grain_count)
-    draw_grains(data, &data->first, plot);
-  else
-    plot->empty = true;
+  draw_grains(data, &data->first, plot);
+}
+
+static void draw_grains_confined(const tal_figure_data *data, tal_plot *plot) {
+  draw_grains(data, &data->confined, plot);
 }
 
 static void draw_grains_last(const tal_figure_data *data, tal_plot *plot) {
@@ -104,7 +109,7 @@ static double quantile(const double *value, size_t count, double share) {
     if (isfinite(value[k]))
       sorted[good++] = fabs(value[k]);
   qsort(sorted, good, sizeof *sorted, ascending);
-  double result = good ? sorted[(size_t)(share * (double)(good - 1))] : 0;
+  double result = good ? sorted[(size_t)ceil(share * (double)(good - 1))] : 0;
   free(sorted);
   return result;
 }
@@ -125,7 +130,7 @@ static void write_arrows(tal_plot *plot, const tal_window *window, const double 
 // A bar as long as `length` is drawn, at the left of heading line 3.
 static void reference_arrow(const tal_map *m, tal_plot *plot, double length, double gain) {
   double pixels = length * gain * m->scale, y = tal_map_line_height(m, 3);
-  double from = 0.5 * m->width - 185 - pixels;
+  double from = m->left + 0.5 * m->box_width - 185 - pixels;
   fprintf(plot->script,
           "set arrow 1 from screen %.6f, screen %.6f to screen %.6f, screen %.6f head filled size screen 0.010,18 "
           "lw 3 lc rgb '#000000' front\n",
@@ -147,8 +152,12 @@ static void draw_displacement(const tal_figure_data *data, tal_plot *plot) {
   tal_map m = tal_map_of_frame(&data->earlier);
   double spacing = sqrt((m.x1 - m.x0) * (m.y1 - m.y0) * (double)stride / (double)n), typical = quantile(size, n, 0.9);
   // Ticks of 1, 2, 5 make the gain a number to remember and the reference a round length.
-  double gain = typical > 0 ? tal_plot_tick_step(1.6 * spacing / typical, 1) : 1;
+  double gain = typical > 0 ? tal_plot_tick_step(1.1 * spacing / typical, 1) : 1;
   double reference = tal_plot_tick_step(typical > 0 ? typical : spacing, 1);
+  // Room for the arrows too, except for grains that flew off.
+  for (size_t k = 0; k < n; k += stride)
+    if (size[k] <= 4 * typical)
+      tal_map_include(&m, window->x[k] + gain * dx[k], window->y[k] + gain * dy[k], 0);
   tal_map_fit(&m, 4, false);
   tal_map_open(&m, data, plot);
   tal_map_heading(&m, plot, 1, "displacement relative to affine, uniform ε_{yy}");
@@ -183,8 +192,9 @@ static void draw_rotation(const tal_figure_data *data, tal_plot *plot) {
   fputs("set palette defined (0 '#00224e', 1 '#123570', 2 '#3b496c', 3 '#575d6d', 4 '#707173', 5 '#8a8678', "
         "6 '#a59c74', 7 '#c3b369', 8 '#fee838') maxcolors 256\n",
         plot->script);
-  fprintf(plot->script, "set cbrange [%.9g:%.9g]\nset cbtics %.9g\nset cblabel 'rotation (degrees)'\nset colorbox\n",
-          -reach, reach, step);
+  fprintf(plot->script,
+          "set cbrange [%.9g:%.9g]\nset cbtics %.9g\nset cblabel 'rotation (degrees)' offset 1\nset colorbox\n", -reach,
+          reach, step);
   FILE *out = tal_plot_data(plot, "discs");
   // Earlier position plus displacement is the position in the last frame.
   for (size_t k = 0; out && k < window->count; k++)
@@ -271,6 +281,8 @@ static void draw_cells_pressure(const tal_figure_data *data, tal_plot *plot) {
 
 const tal_figure tal_figure_grains_first = {"grains_first", "grains and contact forces in the first frame",
                                             TAL_NEEDS_FRAME, draw_grains_first};
+const tal_figure tal_figure_grains_confined = {"grains_confined", "the same in the last frame before the compression",
+                                               TAL_NEEDS_FRAME, draw_grains_confined};
 const tal_figure tal_figure_grains_last = {"grains", "grains and contact forces in the last frame", TAL_NEEDS_FRAME,
                                            draw_grains_last};
 const tal_figure tal_figure_displacement = {"displacement",

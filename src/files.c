@@ -36,7 +36,7 @@ tal_status tal_folder_create(const char *path, tal_error *err) {
     *end = '\0';
     int why = mkdir(part, 0777) == 0 ? 0 : errno;
     if (why && !is_folder(part))
-      return tal_fail(err, TAL_IO, "%s: cannot make the folder: %s", path, strerror(why));
+      return tal_fail(err, TAL_IO, "%s: cannot make the folder: %s", path, strerror(why == EEXIST ? ENOTDIR : why));
     *end = rest;
   }
   return is_folder(path) ? TAL_OK : tal_fail(err, TAL_IO, "%s: cannot make the folder", path);

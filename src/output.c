@@ -67,9 +67,11 @@ void tal_output_close(tal_output *output) {
   free(output);
 }
 
+// A failure on the way in: let go without touching any file.
 static tal_status settle(tal_output **output, tal_status status) {
   if (status == TAL_OK)
     return status;
+  tal_run_files_clear(&(*output)->files);
   tal_output_close(*output);
   *output = NULL;
   return status;

@@ -49,7 +49,7 @@ void tal_output_close(tal_output *output);
 // zero where it knows nothing (always for a new run). Owned by the output.
 const tal_stage_report *tal_output_stages_before(const tal_output *output);
 
-// One row / the tracked grains of this instant / one frame. All observe an instant already observed by tal_sim_row.
+// One row / one frame (the driving forces, as tal_sim_row left them) / the tracked grains (after tal_sim_observe).
 // Times are unique: what was written for this very step already is not written again. TAL_IO; a row that did not fit on
 // the disk is taken off again.
 tal_status tal_output_row(tal_output *output, const tal_row *row, tal_error *err);

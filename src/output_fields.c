@@ -168,7 +168,7 @@ static void put_loop(tal_store *store, const tal_graph *graph) {
 }
 
 static tal_status write_frame(const char *path, tal_sim *sim, size_t *cells, tal_error *err) {
-  tal_observed seen = tal_sim_observe(sim);
+  tal_observed seen = tal_sim_driving(sim);
   tal_store store;
   tal_store_begin(&store);
   tal_store_put_number(&store, "time", sim->run.time);

@@ -170,10 +170,13 @@ tal_status tal_output_tracks(tal_output *output, const tal_sim *sim, tal_error *
   const tal_scene_output *wanted = &output->scene->output;
   if (output->tracks.fd < 0 || output->tracks.step == sim->run.step)
     return TAL_OK;
+  tal_status status = tal_output_check_tracks(output->scene, sim->grains.count, err);
+  if (status != TAL_OK)
+    return status;
   char *text = NULL;
   size_t size = 0;
   FILE *stream = open_memstream(&text, &size);
-  // Ids are 0-based and in index order, tal_output_check_tracks has seen that they exist.
+  // Ids are indices.
   for (size_t k = 0; k < wanted->track_count; k++) {
     put_track(stream, sim->run.time, &sim->grains, (size_t)wanted->tracks[k]);
   }

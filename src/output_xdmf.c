@@ -44,8 +44,12 @@ static void put_grains(FILE *out, size_t frame, long long grains) {
       {"stress_xx", "Float"}, {"stress_xy", "Float"}, {"stress_yx", "Float"}, {"stress_yy", "Float"},
   };
   fprintf(out, "    <Grid Name=\"grains\" GridType=\"Uniform\">\n");
-  fprintf(out, "     <Topology TopologyType=\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=\"%lld\"/>\n",
-          grains);
+  // XDMF 3 makes no points without a list of nodes; ids are the indices 0..n-1.
+  char reference[80];
+  snprintf(reference, sizeof reference, TAL_FRAME_NAME ":/grains/id", frame);
+  fprintf(out, "     <Topology TopologyType=\"Polyvertex\" NodesPerElement=\"1\" NumberOfElements=\"%lld\">", grains);
+  put_item(out, "Int", 8, grains, 1, reference);
+  fprintf(out, "</Topology>\n");
   put_points(out, frame, grains);
   put_attributes(out, "grains", frame, list, sizeof list / sizeof *list, grains);
   fprintf(out, "    </Grid>\n");

@@ -35,16 +35,6 @@ static double width_at_plate(const tal_sim *sim, int side) {
   return sim->grains.x[right] - sim->grains.x[left];
 }
 
-static double loop_width(const tal_sim *sim) {
-  const geo_loop *loop = &sim->graph.loop;
-  double least = INFINITY, most = -INFINITY;
-  for (size_t k = 0; k < loop->count; k++) {
-    least = fmin(least, sim->grains.x[loop->node[k]]);
-    most = fmax(most, sim->grains.x[loop->node[k]]);
-  }
-  return most - least;
-}
-
 static void servo(tal_sim *sim, int side, double target, double speed_limit) {
   tal_wall *plate = tal_walls_plate(&sim->walls, side);
   double load = -side * plate->fy; // grains push the bottom plate (side +1) down
@@ -54,10 +44,7 @@ static void servo(tal_sim *sim, int side, double target, double speed_limit) {
   plate->vy = -side * outward;
 }
 
-void tal_plates_servo(tal_sim *sim, double pressure, double seating, double speed_limit) {
-  double whole = seating > 0 ? loop_width(sim) : 0;
-  for (int side = 1; side >= -1; side -= 2) {
-    double width = (1 - seating) * width_at_plate(sim, side) + seating * whole;
-    servo(sim, side, pressure * sim->constants.thickness * width, speed_limit);
-  }
+void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit) {
+  for (int side = 1; side >= -1; side -= 2)
+    servo(sim, side, pressure * sim->constants.thickness * width_at_plate(sim, side), speed_limit);
 }

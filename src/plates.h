@@ -9,8 +9,8 @@ void tal_plates_ensure(tal_sim *sim);
 double tal_plates_distance(const tal_sim *sim); // [m]
 // Both plates approach each other at `speed` [m/s] in all, half each.
 void tal_plates_drive(tal_sim *sim, double speed);
-// Force servo, eq (23): each plate moves so that its load tends to `pressure` h times the width of the loop at the plate
-// (blended with the loop's whole width while seating, weight 0..1). speed_limit [m/s].
-void tal_plates_servo(tal_sim *sim, double pressure, double seating, double speed_limit);
+// Force servo, eq (23): each plate moves so that its load tends to `pressure` h times the width of the loop between the
+// ends of the arcs at that plate. speed_limit [m/s].
+void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit);
 
 #endif

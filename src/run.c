@@ -68,8 +68,10 @@ static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
   if ((status = tal_output_row(this->output, &this->row, err))) return status;
-  if ((status = tal_output_tracks(this->output, this->sim, err))) return status;
-  return fields ? tal_output_fields(this->output, this->sim, err) : TAL_OK;
+  if (fields && (status = tal_output_fields(this->output, this->sim, err))) return status;
+  if (!this->scene->output.track_count) return TAL_OK;
+  tal_sim_observe(this->sim); // last: it overwrites the driving forces in the slots
+  return tal_output_tracks(this->output, this->sim, err);
 }
 
 // Everything that looks at the run between two steps.

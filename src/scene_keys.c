@@ -23,7 +23,7 @@ typedef struct visit {
 static void walk(visit *v, const tal_key *keys, const char *above) {
   for (const tal_key *key = keys; key->name; key++) {
     char path[128];
-    snprintf(path, sizeof path, "%s%s%s", above, *above ? "." : "", key->name);
+    snprintf(path, sizeof path, "%.80s%s%.40s", above, *above ? "." : "", key->name);
     v->row(v, path, key);
     if (key->keys)
       walk(v, key->keys, path);
@@ -163,14 +163,14 @@ static void print_words(FILE *out, const tal_key *keys, const char *above) {
     char path[128];
     if (tal_schema_row(keys, key->name, NULL) != key)
       continue;
-    snprintf(path, sizeof path, "%s%s%s", above, *above ? "." : "", key->name);
+    snprintf(path, sizeof path, "%.80s%s%.40s", above, *above ? "." : "", key->name);
     if (key->type != TAL_KEY_GROUP)
       fprintf(out, "%s\n", path);
     if (key->type != TAL_KEY_LIST && key->keys)
       print_words(out, key->keys, path);
     for (int i = 0; key->type == TAL_KEY_LIST && i < 4; i++) {
       char item[140];
-      snprintf(item, sizeof item, "%s.%d", path, i);
+      snprintf(item, sizeof item, "%.120s.%d", path, i);
       print_words(out, key->keys, item);
     }
   }

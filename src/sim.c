@@ -168,12 +168,19 @@ bool tal_sim_done(const tal_sim *sim) {
          (sim->run.stage_done && (size_t)sim->run.stage + 1 >= sim->scene->stage_count);
 }
 
+static tal_velocities velocities_now(const tal_grains *g) {
+  return (tal_velocities){g->vx, g->vy, g->omega, g->vx, g->vy, g->omega, 0};
+}
+
 tal_observed tal_sim_observe(tal_sim *sim) {
-  tal_grains *g = &sim->grains;
-  tal_velocities now = {g->vx, g->vy, g->omega, g->vx, g->vy, g->omega, 0};
   if (sim->boundary && sim->graph.valid) sim->boundary->apply(sim);
-  tal_forces_sweep(sim, now);
-  tal_forces_slip(sim, now);
+  tal_forces_sweep(sim, velocities_now(&sim->grains));
+  return tal_sim_driving(sim);
+}
+
+tal_observed tal_sim_driving(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  tal_forces_slip(sim, velocities_now(g));
   tal_forces_resultants(sim);
   return (tal_observed){.grains = g,
                         .pairs = &sim->pairs,
@@ -228,7 +235,7 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   const tal_run *run = &sim->run;
   const tal_scene_stage *plan = tal_sim_stage(sim);
   fresh_graph(sim);
-  tal_observed seen = tal_sim_observe(sim);
+  tal_observed seen = tal_sim_driving(sim);
   tal_macro macro;
   tal_macro_measure(&seen, &macro);
   int64_t grain;
@@ -250,6 +257,7 @@ void tal_sim_restored(tal_sim *sim) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   sim->stage = plan ? tal_stage_find(plan->kind) : NULL;
   sim->boundary = NULL;
+  sim->boundary_moved = true;
   if (plan) {
     sim->dt = plan->integrator.dt;
     sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;

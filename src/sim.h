@@ -17,7 +17,7 @@
   X(int64_t, stage, "1", "index of the current stage; the number of stages when all are done")                        \
   X(int64_t, stage_step, "1", "steps taken in this stage")                                                             \
   X(double, stage_start, "s", "time at which this stage began")                                                        \
-  X(int64_t, stage_phase, "1", "what the stage is doing (its own numbering)")                                          \
+  X(int64_t, bedding, "1", "1 while the plates bed the uneven ends of a packing")                                      \
   X(int64_t, stage_begun, "1", "1 once the stage has set itself up")                                                   \
   X(int64_t, force_evaluations, "1", "sweeps over the contacts that drove the motion")                                 \
   X(int64_t, refresh_step, "1", "step of the last refresh of the graph")                                               \
@@ -28,7 +28,6 @@
   X(double, height0, "m", "distance of the plates when the first compress began")                                      \
   X(double, axial_strain, "1", "engineering axial strain, compression positive")                                       \
   X(double, pressure, "Pa", "pressure applied now on the loop")                                                        \
-  X(double, phase_time, "s", "time at which the current phase of the stage began")                                     \
   X(double, impulse_time, "s", "start of the window over which mean forces are taken")                                 \
   X(int64_t, arc_bottom_left, "1", "place on the loop where the left arc ends")                                        \
   X(int64_t, arc_bottom_right, "1", "place on the loop where the right arc begins")                                    \
@@ -126,6 +125,7 @@ struct tal_sim {
   tal_run run;
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
   const tal_boundary *boundary; // what presses the loop now, NULL: nothing
+  bool boundary_moved;          // the boundary acts on other grains than at the last evaluation
   double friction;              // [-] of grain-grain contacts now (a stage may change it)
   double dt;                    // [s] of the current stage
   unsigned effects;             // mask of effects.h that the hot loop pays for
@@ -139,9 +139,14 @@ void tal_sim_free(tal_sim *sim);
 tal_status tal_sim_step(tal_sim *sim, tal_error *err);
 // True when every stage is finished.
 bool tal_sim_done(const tal_sim *sim);
-// Forces of this instant with this instant's velocities into slots and rx, ry; changes nothing that the motion sees.
+// The forces that drive the motion at this instant, as the last step left them in the slots: sums into rx, ry, rtorque.
+// What series and fields look at. Where explicit friction chatters these balance the boundary forces in the mean; forces
+// read again with the corrected velocities do not (method.md, chapter 4).
+tal_observed tal_sim_driving(tal_sim *sim);
+// Forces of this instant read again with this instant's velocities, into slots and rx, ry, rtorque; changes nothing that
+// the motion sees. What tracks look at. Equal to the driving forces up to the order of the integrator.
 tal_observed tal_sim_observe(tal_sim *sim);
-// The series line of this instant (observes first).
+// The series line of this instant, from the driving forces.
 void tal_sim_row(tal_sim *sim, tal_row *row);
 // After STATE fields, graph and run were put back: everything that follows from them.
 void tal_sim_restored(tal_sim *sim);

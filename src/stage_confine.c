@@ -1,6 +1,6 @@
-// Confinement, eqs (22)-(24): the pressure on the loop's arcs is ramped up, the plates follow under a force servo.
-// While the pressure rises the plates aim at the whole width of the loop, which beds the uneven top of a packing; then
-// at the width they really cover, which is what a uniform stress p asks for.
+// Confinement, eqs (22)-(24): the pressure on the loop's sides is ramped up, the plates follow under a force servo that
+// aims at p h times the width they stand for. While the pressure rises the plates bed the uneven ends of the packing:
+// the arcs end at the corners of the sample. Then the arcs end at the outermost grains that touch.
 // Ends when sigma_xx = sigma_yy = p within the tolerance and the assembly is at rest; fails, saying what was reached,
 // after the timeout. "At rest" looks at forces averaged over a window (the change of momentum across it): explicit
 // regularised friction chatters from step to step however still the grains are.
@@ -8,13 +8,12 @@
 
 #include "boundary.h"
 #include "plates.h"
+#include "step.h"
 
 #include <string.h>
 
-enum { RAMP, HOLD };
-
-// Length of the window and of the blend from seating to holding, as shares of the ramp.
-static const double window_share = 0.025, blend_share = 0.25;
+// Length of the window of mean forces as a share of the ramp.
+static const double window_share = 0.025;
 
 static void open_window(tal_sim *sim) {
   tal_grains *g = &sim->grains;
@@ -27,7 +26,7 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
   (void)err;
   tal_plates_ensure(sim);
   sim->boundary = &tal_boundary_pressure;
-  sim->run.stage_phase = RAMP;
+  sim->run.bedding = 1;
   sim->run.pressure = 0;
   sim->run.rest = INFINITY;
   open_window(sim);
@@ -35,16 +34,11 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
   return TAL_OK;
 }
 
-static double seating(const tal_sim *sim, const tal_scene_stage *plan) {
-  if (sim->run.stage_phase == RAMP) return 1;
-  return fmax(0, 1 - (sim->run.time - sim->run.phase_time) / (blend_share * plan->ramp));
-}
-
 static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   double elapsed = sim->run.time + sim->dt - sim->run.stage_start;
   sim->run.pressure = plan->pressure * fmin(1, elapsed / plan->ramp);
   double speed_limit = 0.1 * tal_plates_distance(sim) / plan->ramp;
-  tal_plates_servo(sim, sim->run.pressure, seating(sim, plan), speed_limit);
+  tal_plates_servo(sim, sim->run.pressure, speed_limit);
 }
 
 // Mean of m |dv| / window over the free grains, over the mean contact force of this instant.
@@ -68,16 +62,17 @@ static bool near(double stress, double pressure, double tolerance) {
 static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   tal_run *run = &sim->run;
   double elapsed = run->time - run->stage_start;
-  if (run->stage_phase == RAMP && elapsed >= plan->ramp) {
-    run->stage_phase = HOLD;
-    run->phase_time = run->time;
+  if (run->bedding && elapsed >= plan->ramp) {
+    run->bedding = 0;
+    tal_status status = tal_step_refresh(sim, err); // the arcs end elsewhere now
+    if (status) return status;
   }
   if (run->time - run->impulse_time < window_share * plan->ramp * (1 - 1e-9)) return TAL_OK;
-  tal_observed seen = tal_sim_observe(sim);
+  tal_observed seen = tal_sim_driving(sim);
   tal_macro macro;
   tal_macro_measure(&seen, &macro);
   close_window(sim, &macro);
-  if (run->stage_phase == RAMP || seating(sim, plan) > 0) return TAL_OK;
+  if (run->bedding) return TAL_OK;
   run->stage_done = near(macro.stress.xx, plan->pressure, plan->tolerance) &&
                     near(macro.stress.yy, plan->pressure, plan->tolerance) && run->rest <= plan->unbalanced;
   if (run->stage_done || elapsed < plan->timeout) return TAL_OK;

@@ -29,6 +29,7 @@ static inline void scene_folder_remove(scene_folder *folder) {
 }
 
 static inline void scene_folder_write(const scene_folder *folder, const char *text, size_t size) {
+  unlink(folder->file); // a new file: some file systems flush to disk on rewriting an old one
   FILE *file = fopen(folder->file, "wb");
   assert_non_null(file);
   assert_int_equal(fwrite(text, 1, size, file), size);

@@ -227,6 +227,36 @@ static void necks(void **state) {
   }
 }
 
+// EXACT: two blocks a wide slit apart, narrowest at height 3, stay joined there and nowhere else: longest gaps go
+// first.
+static void narrowest_bridge(void **state) {
+  (void)state;
+  assembly *a = make_assembly();
+  for (int row = 0; row < 12; row++)
+    for (int side = 0; side < 2; side++) {
+      double edge = side ? 2.5 + 0.0625 * fabs(row - 3.0) : 0;
+      add_disc(a, edge, row, 0.5);
+      add_disc(a, edge + (side ? 1 : -1), row, 0.5);
+    }
+  assert_int_equal(peel(a, 0.6), 0);
+  check_loop(a, 0.6);
+  assert_int_equal(a->loop.outside_count, 0);
+  size_t bridges = 0;
+  for (size_t t = 0; t < a->mesh.triangle_count; t++) {
+    int right = 0, far = 0;
+    for (int k = 0; k < 3; k++) {
+      right += a->x[a->mesh.corner[t][k]] > 1;
+      far += fabs(a->y[a->mesh.corner[t][k]] - 3) > 1;
+    }
+    if (!a->inside[t] || right == 0 || right == 3)
+      continue;
+    bridges++;
+    assert_int_equal(far, 0);
+  }
+  assert_in_range(bridges, 1, 2);
+  free_assembly(a);
+}
+
 // EXACT: three discs, near and far; a limit nothing survives leaves an empty loop and says so.
 static void three(void **state) {
   (void)state;
@@ -378,7 +408,7 @@ int main(void) {
       cmocka_unit_test(rattlers),   cmocka_unit_test(necks),
       cmocka_unit_test(three),      cmocka_unit_test(random_clouds),
       cmocka_unit_test(invariance), cmocka_unit_test(velocity_gradient),
-      cmocka_unit_test(set),
+      cmocka_unit_test(set),        cmocka_unit_test(narrowest_bridge),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

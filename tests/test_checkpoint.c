@@ -102,8 +102,8 @@ static void test_round_trip(void **state) {
   tal_sim *again = make_sim(&run.scene, 0);
   run.sim->grains.torque[1] = -0.0;
   run.sim->grains.friction_work[2] = 0x1p-1074;
-  run.sim->grains.held_work[3] = NAN;
-  run.sim->run.height0 = INFINITY;
+  run.sim->grains.held_work[3] = (double)NAN;
+  run.sim->run.height0 = (double)INFINITY;
   char *text = tal_scene_text(&run.scene), a[TAL_PATH_SIZE], b[TAL_PATH_SIZE];
   write_here(&run, "a.h5", run.sim);
   assert_int_equal(read_here(&run, "a.h5", again, text, &err), TAL_OK);

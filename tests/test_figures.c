@@ -132,6 +132,7 @@ static void write_frame(const char *dir, int number, double strain, const int32_
   put_column(file, "/contacts/i", H5T_NATIVE_INT32, 3, i);
   put_column(file, "/contacts/j", H5T_NATIVE_INT32, 3, partner);
   put_column(file, "/contacts/fn", H5T_NATIVE_DOUBLE, 3, (double[]){1, 2, 30});
+  put_column(file, "/contacts/overlap", H5T_NATIVE_DOUBLE, 3, (double[]){1e-7, 1e-7, 1e-15});
   put_column(file, "/cells/i", H5T_NATIVE_INT32, 2, a);
   put_column(file, "/cells/j", H5T_NATIVE_INT32, 2, b);
   put_column(file, "/cells/k", H5T_NATIVE_INT32, 2, c);
@@ -301,10 +302,9 @@ static void hostile_names(void **state) {
     tal_frame frame = {.grain_count = 1, .x = (double[]){0}, .y = (double[]){0}, .r = (double[]){1e-3}};
     tal_map map = tal_map_of_frame(&frame);
     assert_int_equal(tal_plot_begin(&plot, *state, &err), TAL_OK);
-    char *inner_trap = tal_path_join(plot.folder, "trap");
     tal_map_fit(&map, 1, false);
     tal_map_open(&map, &data, &plot);
-    // A second chance for the trap: it would lie in the folder that gnuplot works in.
+    // gnuplot works in the temporary folder: there a sprung trap would lie.
     fprintf(plot.script, "plot 0\nif (system('ls trap 2>/dev/null') ne '') { exit status 7 }\n");
     char *picture = tal_path_join(*state, "p.png");
     tal_status status = tal_plot_finish(&plot, picture, &err);
@@ -312,10 +312,8 @@ static void hostile_names(void **state) {
       fail_msg("name %zu: %s", k, err.text);
     assert_int_equal(read_png(*state, "p.png").width, map.width);
     assert_int_equal(access(trap, F_OK), -1);
-    assert_int_equal(access(inner_trap, F_OK), -1);
     unlink(picture);
     free(picture);
-    free(inner_trap);
   }
   assert_int_equal(access("trap", F_OK), -1);
   free(trap);
@@ -354,6 +352,19 @@ static void gnuplot_hangs(void **state) {
   assert_true(end.tv_sec - begin.tv_sec < 10);
   assert_non_null(strstr(err.text, "longer than 0.2 s"));
   assert_int_equal(count_entries(*state, "."), 0);
+}
+
+// EXACT: a signal that reaches gnuplot (Ctrl-C does) counts as the user's wish, and nothing is left in the folder.
+static void gnuplot_is_interrupted(void **state) {
+  static const char *const signals[] = {"INT", "TERM"};
+  for (int k = 0; k < 2; k++) {
+    char script[120];
+    tal_error err;
+    snprintf(script, sizeof script, "system '(sleep 0.2; kill -%s $PPID) >/dev/null 2>&1 &'\npause 20\n", signals[k]);
+    assert_int_equal(run_script(*state, script, 60, &err), TAL_INTERRUPTED);
+    assert_non_null(strstr(err.text, "p.png"));
+    assert_int_equal(count_entries(*state, "."), 0);
+  }
 }
 
 // EXACT: without gnuplot one sentence names the package; the run is untouched and no temporary file stays.
@@ -492,6 +503,8 @@ static void window_of_frames(void **state) {
   assert_int_equal(data.window.count, 4);
   assert_true(data.window.dtheta[3] == 2 * 0.045 - 2 * 0.02);
   assert_true(data.window.dy[0] == 0 && data.window.dx[2] == 0);
+  assert_true(data.confined.time == 1 && data.first.time == 0);
+  assert_int_equal(data.last.contact_count, 2); // the third overlaps by less than round-off
   assert_int_equal(data.last.wall_count, 2);
   assert_true(data.last.wall[0][0] == -5e-4 && data.last.wall[0][2] == 1e-3 + 5e-4 && data.last.wall[1][0] == 1);
   tal_figure_data_clear(&data);
@@ -528,11 +541,11 @@ static void damaged_frames(void **state) {
 int main(void) {
 #define TEST(name) cmocka_unit_test_setup_teardown(name, make_folder, drop_folder)
   const struct CMUnitTest tests[] = {
-      TEST(table_columns_by_name), TEST(table_with_cr),         TEST(table_refuses),     TEST(facts_of_a_run),
-      TEST(text_is_quoted),        TEST(hostile_names),         TEST(gnuplot_complains), TEST(gnuplot_hangs),
-      TEST(gnuplot_is_missing),    TEST(affine_leaves_nothing), TEST(affine_keeps_slip), TEST(empty_folder),
-      TEST(series_only),           TEST(runs_without_strain),   TEST(frames_give_maps),  TEST(window_of_frames),
-      TEST(damaged_frames),
+      TEST(table_columns_by_name),  TEST(table_with_cr),      TEST(table_refuses),         TEST(facts_of_a_run),
+      TEST(text_is_quoted),         TEST(hostile_names),      TEST(gnuplot_complains),     TEST(gnuplot_hangs),
+      TEST(gnuplot_is_interrupted), TEST(gnuplot_is_missing), TEST(affine_leaves_nothing), TEST(affine_keeps_slip),
+      TEST(empty_folder),           TEST(series_only),        TEST(runs_without_strain),   TEST(frames_give_maps),
+      TEST(window_of_frames),       TEST(damaged_frames),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,7 @@
 #include "scene_files.h"
 #include "scene_keys.h"
 #include "scene_value.h"
+#include "scene_yaml.h"
 
 #include <locale.h>
 #include <math.h>
@@ -491,11 +492,35 @@ static void test_keys(void **state) {
   }
 }
 
+// EXACT: the JSON Schema is well formed, without a key twice, and says what the table says.
+static void test_json_schema(void **state) {
+  (void)state;
+  char *text = NULL;
+  size_t size;
+  FILE *out = open_memstream(&text, &size);
+  tal_keys_json(out);
+  fclose(out);
+  tal_tree tree = {0};
+  tal_yaml_error error;
+  tal_node *root = tal_yaml_parse(&tree, text, size, NULL, &error);
+  if (!root)
+    print_error("line %d: %s\n", error.line, error.text);
+  assert_non_null(root);
+  tal_node *young = tal_node_find(root, "properties.material.properties.young");
+  assert_string_equal(tal_node_find(young, "exclusiveMinimum")->text, "0");
+  assert_string_equal(tal_node_find(root, "properties.seed.default")->text, "1");
+  assert_int_equal(tal_node_find(root, "properties.stages.items.allOf")->count, 3);
+  assert_int_equal(tal_node_find(root, "properties.walls.items.required")->count, 2);
+  tal_tree_clear(&tree);
+  free(text);
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(test_design),          cmocka_unit_test(test_defaults),  cmocka_unit_test(test_listed),
       cmocka_unit_test(test_contact_choices), cmocka_unit_test(test_overrides), cmocka_unit_test(test_round_trip),
       cmocka_unit_test(test_layout),          cmocka_unit_test(test_damaged),   cmocka_unit_test(test_locale),
-      cmocka_unit_test(test_scalars),         cmocka_unit_test(test_printed),   cmocka_unit_test(test_keys)};
+      cmocka_unit_test(test_scalars),         cmocka_unit_test(test_printed),   cmocka_unit_test(test_keys),
+      cmocka_unit_test(test_json_schema)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -52,7 +52,7 @@ static const bad_line bad_lines[] = {
     {6, "integrator: {scheme: two_timescale, dt: 1e-5}", 6, "integrator.scheme", "accepted: verlet"},
     {9, "  - {kind: shear, rate: 5e-3, strain: 0.2}", 9, "stages[1].kind", "accepted: free, confine, compress"},
     {9, "  - {kind: compress, boundary: membrane, rate: 5e-3, strain: 0.2}", 9, "stages[1].boundary", "pressure"},
-    {5, "pack: {method: rain, width: 60e-3}", 5, "pack.method", "accepted: none, drop_and_roll, lattice, file"},
+    {5, "pack: {method: rain, width: 60e-3}", 5, "pack.method", "'rain' is not known; accepted: "},
     {1, "continuum: {backend: voronoi}", 1, "continuum.backend", "'voronoi' is not known; accepted: "},
     {1, "continuum: {tessellation: voronoi}", 1, "continuum.tessellation", "accepted: delaunay, power"},
     // numbers
