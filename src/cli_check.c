@@ -76,17 +76,17 @@ static double measured_rate(tal_sim *sim) {
 static double first_pressure(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
     if (scene->stages[s].pressure > 0) return scene->stages[s].pressure;
-  return NAN;
+  return (double)NAN;
 }
 
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
     if (scene->stages[s].rate > 0) return scene->stages[s].rate;
-  return NAN;
+  return (double)NAN;
 }
 
 static double packed_height(const tal_grains *g) {
-  double bottom = INFINITY, top = -INFINITY;
+  double bottom = (double)INFINITY, top = -(double)INFINITY;
   for (size_t i = 0; i < g->count; i++) {
     bottom = fmin(bottom, g->y[i] - g->r[i]);
     top = fmax(top, g->y[i] + g->r[i]);

@@ -49,7 +49,7 @@ double tal_critical_step(const tal_sim *sim) {
   double(*sum)[2] = tal_alloc(g->count, sizeof *sum);
   add_slots(sim, &sim->pairs, true, sum);
   add_slots(sim, &sim->wall_contacts, false, sum);
-  double least = INFINITY;
+  double least = (double)INFINITY;
   const tal_contacts *s = &sim->pairs;
   for (size_t c = 0; c < s->count; c++) {
     if (s->overlap[c] <= 0) continue;
@@ -108,7 +108,7 @@ double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, d
       damping = 2 * tal_linear_damping_ratio(scene->contact.restitution) * sqrt(stiffness * reduced_mass);
     return tal_critical_step_pair(stiffness, damping, reduced_mass);
   }
-  double least = INFINITY;
+  double least = (double)INFINITY;
   for (size_t s = 0; s < scene->stage_count; s++) {
     if (!(scene->stages[s].pressure > 0)) continue;
     double damping, slope = confined_slope(scene, k, scene->stages[s].pressure, &damping);
@@ -120,7 +120,7 @@ double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, d
 double tal_friction_step(const tal_sim *sim, double pressure) {
   const tal_constants *k = &sim->constants;
   double cap = sim->scene->material.friction * pressure * 2 * k->mean_radius * k->thickness;
-  if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0)) return INFINITY;
+  if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0)) return (double)INFINITY;
   // two free disks: the slip answers a tangential force with 2 (1/m + R^2/I) = 6/m
   return k->vR * k->mean_mass / (6 * cap);
 }

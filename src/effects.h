@@ -22,5 +22,7 @@ enum tal_effect {
 
 // A pure function that must vanish into the loop that calls it.
 #define TAL_KERNEL static inline __attribute__((always_inline))
+// Stands in a loop that is better left scalar.
+#define TAL_SCALAR_LOOP __asm__ volatile("")
 
 #endif

@@ -1,91 +1,98 @@
-// The hot loop. Slots are taken in blocks: a scalar loop fetches what the two grains bring, a vector loop works out
-// geometry and law for the whole block (contact kernel of law.h), and stores go straight to the slots.
-// Numbers of the variants listed at the end: tests/bench/bench_step.c.
+// The hot loop. Slots are taken in blocks: a scalar loop fetches the records of the two grains, a vector loop works out
+// geometry and law for the whole block (law.h), a last loop packs the forces into one record per contact. Then each grain
+// sums its records in the order of its partners. Measured by tests/bench/bench_step.c.
 #include "forces.h"
 
 #include "effects.h"
 #include "law.h"
 
-enum { BLOCK = 128 };
+// Contacts and grains taken at a time.
+enum { BLOCK = 128, CHUNK = 256 };
 
-// What a block of contacts brings, one array per quantity.
+// What a block of contacts brings, and what the law makes of it; one array per quantity.
 typedef struct block {
-  double dx[BLOCK], dy[BLOCK];                   // centre i - centre j
-  double ux[BLOCK], uy[BLOCK];                   // velocity i - velocity j
-  double hx[BLOCK], hy[BLOCK];                   // the same in the middle of the step
-  double ri[BLOCK], rj[BLOCK];                   // radii
-  double wi[BLOCK], wj[BLOCK];                   // spins
-  double vi[BLOCK], vj[BLOCK];                   // spins in the middle of the step
+  double dx[BLOCK], dy[BLOCK];   // centre i - centre j
+  double ux[BLOCK], uy[BLOCK];   // velocity i - velocity j
+  double hx[BLOCK], hy[BLOCK];   // the same in the middle of the step
+  double reach[BLOCK];           // sum of the radii
+  double spins[BLOCK];           // sum of the spins
+  double speeds[BLOCK];          // sum of radius times spin
+  double force[8][BLOCK];        // members of tal_force_record
 } block;
 
-TAL_KERNEL void fetch(block *b, const tal_sim *sim, const tal_velocities *u, size_t start, int count, unsigned effects) {
-  const tal_grains *g = &sim->grains;
+TAL_KERNEL void fetch(block *b, const tal_sim *sim, size_t start, int count, unsigned effects) {
   const int32_t *restrict slot_i = sim->pairs.i + start, *restrict slot_j = sim->pairs.j + start;
   for (int k = 0; k < count; k++) {
-    int32_t i = slot_i[k], j = slot_j[k];
-    b->dx[k] = g->x[i] - g->x[j];
-    b->dy[k] = g->y[i] - g->y[j];
-    b->ri[k] = g->r[i];
-    b->rj[k] = g->r[j];
+    const tal_grain_record *i = &sim->grain_records[slot_i[k]], *j = &sim->grain_records[slot_j[k]];
+    TAL_SCALAR_LOOP; // a dozen gathers cost more than two cache lines
+    b->dx[k] = i->x - j->x;
+    b->dy[k] = i->y - j->y;
+    b->reach[k] = i->r + j->r;
     if (effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED)) {
-      b->ux[k] = u->x[i] - u->x[j];
-      b->uy[k] = u->y[i] - u->y[j];
-    }
-    if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_REGULARISED)) {
-      b->wi[k] = u->omega[i];
-      b->wj[k] = u->omega[j];
+      b->ux[k] = i->ux - j->ux;
+      b->uy[k] = i->uy - j->uy;
     }
     if (effects & TAL_EFFECT_SPRING) {
-      b->hx[k] = u->half_x[i] - u->half_x[j];
-      b->hy[k] = u->half_y[i] - u->half_y[j];
+      b->hx[k] = i->hx - j->hx;
+      b->hy[k] = i->hy - j->hy;
     }
-    if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_SPRING)) {
-      b->vi[k] = u->half_omega[i];
-      b->vj[k] = u->half_omega[j];
+    if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_FRICTION)) {
+      b->spins[k] = i->spin + j->spin;
+      b->speeds[k] = i->r * i->spin + j->r * j->spin;
     }
   }
 }
 
-// Slip speed of i against j along t = (-ny, nx), lever arms r - d/2 [eq (9)].
-TAL_KERNEL double slip_speed(double nx, double ny, double ux, double uy, double arm_i, double arm_j, double wi,
-                             double wj, unsigned effects) {
+// Slip speed of i against j along t = (-ny, nx) with the lever arms r - d/2, eq (9): speeds is r_i w_i + r_j w_j, spins
+// is w_i + w_j.
+TAL_KERNEL double slip_speed(double nx, double ny, double ux, double uy, double half_overlap, double speeds,
+                             double spins, unsigned effects) {
   double slip = nx * uy - ny * ux;
-  if (effects & TAL_EFFECT_SPIN) slip -= arm_i * wi + arm_j * wj;
+  if (effects & TAL_EFFECT_SPIN) slip -= speeds - half_overlap * spins;
   return slip;
 }
 
-TAL_KERNEL void work_out(const block *restrict b, tal_contacts *slots, size_t start, int count, double dt,
-                         tal_law_constants constants, unsigned effects) {
+TAL_KERNEL void work_out(block *b, tal_contacts *slots, size_t start, int count, double dt, tal_law_constants constants,
+                         unsigned effects) {
+  const double *restrict dx = b->dx, *restrict dy = b->dy, *restrict ux = b->ux, *restrict uy = b->uy;
+  const double *restrict hx = b->hx, *restrict hy = b->hy;
+  const double *restrict reach = b->reach, *restrict spins = b->spins, *restrict speeds = b->speeds;
   const double *restrict stiffness = slots->stiffness + start, *restrict damping = slots->damping + start;
   const double *restrict friction = slots->friction + start;
   double *restrict spring = slots->spring + start, *restrict spring_stiffness = slots->spring_stiffness + start;
-  double *restrict nx = slots->nx + start, *restrict ny = slots->ny + start, *restrict overlap = slots->overlap + start;
-  double *restrict fe = slots->fe + start, *restrict fd = slots->fd + start, *restrict ft = slots->ft + start;
+  double *restrict ex = b->force[0], *restrict ey = b->force[1], *restrict vx = b->force[2], *restrict vy = b->force[3];
+  double *restrict tx = b->force[4], *restrict ty = b->force[5], *restrict ft = b->force[6], *restrict fh = b->force[7];
 #pragma omp simd
   for (int k = 0; k < count; k++) {
-    double distance = sqrt(b->dx[k] * b->dx[k] + b->dy[k] * b->dy[k]);
+    double distance = sqrt(dx[k] * dx[k] + dy[k] * dy[k]);
     double inverse = 1 / distance;
-    double x = b->dx[k] * inverse, y = b->dy[k] * inverse;
-    tal_meeting m = {.overlap = b->ri[k] + b->rj[k] - distance, .stiffness = stiffness[k], .friction = friction[k]};
-    double arm_i = b->ri[k] - 0.5 * m.overlap, arm_j = b->rj[k] - 0.5 * m.overlap;
+    double x = dx[k] * inverse, y = dy[k] * inverse;
+    tal_meeting m = {.overlap = reach[k] - distance, .stiffness = stiffness[k], .friction = friction[k]};
+    double half_overlap = 0.5 * m.overlap;
     if (effects & TAL_EFFECT_DAMPING) {
       m.damping = damping[k];
-      m.approach = -(x * b->ux[k] + y * b->uy[k]);
+      m.approach = -(x * ux[k] + y * uy[k]);
     }
     if (effects & TAL_EFFECT_REGULARISED)
-      m.slip = slip_speed(x, y, b->ux[k], b->uy[k], arm_i, arm_j, b->wi[k], b->wj[k], effects);
+      m.slip = slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
     if (effects & TAL_EFFECT_SPRING) {
-      m.slip_distance = dt * slip_speed(x, y, b->hx[k], b->hy[k], arm_i, arm_j, b->vi[k], b->vj[k], effects);
+      m.slip_distance = dt * slip_speed(x, y, hx[k], hy[k], half_overlap, speeds[k], spins[k], effects);
       m.spring = spring[k];
       m.spring_stiffness = spring_stiffness[k];
     }
     tal_law_force f = tal_contact_law(m, constants, effects);
-    nx[k] = x;
-    ny[k] = y;
-    overlap[k] = m.overlap;
-    fe[k] = f.fe;
-    fd[k] = f.fd;
-    ft[k] = f.ft;
+    ex[k] = f.fe * x;
+    ey[k] = f.fe * y;
+    if (effects & TAL_EFFECT_DAMPING) {
+      vx[k] = f.fd * x;
+      vy[k] = f.fd * y;
+    }
+    if (effects & TAL_EFFECT_FRICTION) {
+      tx[k] = -f.ft * y;
+      ty[k] = f.ft * x;
+      ft[k] = f.ft;
+      fh[k] = f.ft * half_overlap;
+    }
     if (effects & TAL_EFFECT_SPRING) {
       spring[k] = dt > 0 ? f.ft : spring[k];
       spring_stiffness[k] = dt > 0 ? f.spring_stiffness : spring_stiffness[k];
@@ -93,48 +100,27 @@ TAL_KERNEL void work_out(const block *restrict b, tal_contacts *slots, size_t st
   }
 }
 
-TAL_KERNEL void sweep_pairs(tal_sim *sim, const tal_velocities *u, tal_law_constants constants, unsigned effects) {
-  const size_t blocks = (sim->pairs.count + BLOCK - 1) / BLOCK;
-#pragma omp parallel for schedule(static) if (blocks > 8)
-  for (size_t k = 0; k < blocks; k++) {
-    block b;
-    size_t start = k * BLOCK;
-    int count = (int)(sim->pairs.count - start < BLOCK ? sim->pairs.count - start : BLOCK);
-    fetch(&b, sim, u, start, count, effects);
-    work_out(&b, &sim->pairs, start, count, u->dt, constants, effects);
+TAL_KERNEL void pack(const block *b, tal_force_record *restrict out, int count, unsigned effects) {
+  for (int k = 0; k < count; k++) {
+    out[k].elastic_x = b->force[0][k];
+    out[k].elastic_y = b->force[1][k];
+    out[k].viscous_x = effects & TAL_EFFECT_DAMPING ? b->force[2][k] : 0;
+    out[k].viscous_y = effects & TAL_EFFECT_DAMPING ? b->force[3][k] : 0;
+    if (effects & TAL_EFFECT_FRICTION) {
+      out[k].friction_x = b->force[4][k];
+      out[k].friction_y = b->force[5][k];
+      out[k].ft = b->force[6][k];
+      out[k].ft_half_overlap = b->force[7][k];
+    }
   }
 }
 
-// One grain-wall slot: the wall's own velocity counts, its lever arm is r - d.
-static void wall_slot(tal_sim *sim, const tal_velocities *u, tal_law_constants constants, size_t c) {
-  tal_contacts *slots = &sim->wall_contacts;
-  const tal_grains *g = &sim->grains;
-  int32_t i = slots->i[c];
-  const tal_wall *wall = &sim->walls.wall[slots->j[c]];
-  tal_wall_point near = tal_wall_nearest(wall, g->x[i], g->y[i]);
-  tal_meeting m = {.overlap = g->r[i] - near.distance,
-                   .stiffness = slots->stiffness[c],
-                   .damping = slots->damping[c],
-                   .friction = slots->friction[c],
-                   .spring = slots->spring[c],
-                   .spring_stiffness = slots->spring_stiffness[c]};
-  double arm = g->r[i] - m.overlap;
-  double ux = u->x[i] - wall->vx, uy = u->y[i] - wall->vy;
-  m.approach = -(near.nx * ux + near.ny * uy);
-  m.slip = slip_speed(near.nx, near.ny, ux, uy, arm, 0, u->omega[i], 0, sim->effects);
-  m.slip_distance = u->dt * slip_speed(near.nx, near.ny, u->half_x[i] - wall->vx, u->half_y[i] - wall->vy, arm, 0,
-                                       u->half_omega[i], 0, sim->effects);
-  tal_law_force f = tal_contact_law(m, constants, sim->effects);
-  slots->nx[c] = near.nx;
-  slots->ny[c] = near.ny;
-  slots->overlap[c] = m.overlap;
-  slots->fe[c] = f.fe;
-  slots->fd[c] = f.fd;
-  slots->ft[c] = f.ft;
-  if (u->dt > 0) {
-    slots->spring[c] = f.ft;
-    slots->spring_stiffness[c] = f.spring_stiffness;
-  }
+TAL_KERNEL void sweep_block(tal_sim *sim, double dt, tal_law_constants constants, size_t start, unsigned effects) {
+  block b;
+  int count = (int)(sim->pairs.count - start < BLOCK ? sim->pairs.count - start : BLOCK);
+  fetch(&b, sim, start, count, effects);
+  work_out(&b, &sim->pairs, start, count, dt, constants, effects);
+  pack(&b, sim->force_records + start, count, effects);
 }
 
 // The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
@@ -146,40 +132,97 @@ static void wall_slot(tal_sim *sim, const tal_velocities *u, tal_law_constants c
   X(TAL_EFFECT_DAMPING)                                                                                                \
   X(0)
 
-void tal_forces_sweep(tal_sim *sim, tal_velocities velocities) {
-  const tal_scene_contact *law = &sim->scene->contact;
-  tal_law_constants constants = {.inverse_vR = 1 / sim->constants.vR,
-                                 .inverse_exponent = 1 / law->exponent,
-                                 .tangential_ratio = sim->constants.tangential_ratio};
+// The switch stands inside the parallel loop: a parallel region is outlined before inlining, and a mask passed into it
+// would no longer be a constant.
+static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, size_t start) {
   switch (sim->effects & TAL_EFFECT_LAW) {
 #define X(mask)                                                                                                        \
   case (mask):                                                                                                         \
-    sweep_pairs(sim, &velocities, constants, (mask));                                                                  \
+    sweep_block(sim, dt, constants, start, (mask));                                                                     \
     break;
     VARIANTS(X)
 #undef X
   default:
-    sweep_pairs(sim, &velocities, constants, sim->effects & TAL_EFFECT_LAW);
+    sweep_block(sim, dt, constants, start, sim->effects & TAL_EFFECT_LAW);
   }
-  for (size_t c = 0; c < sim->wall_contacts.count; c++) wall_slot(sim, &velocities, constants, c);
 }
 
-void tal_forces_slip(tal_sim *sim, tal_velocities u) {
+// One grain-wall slot: the wall's own velocity counts, its lever arm is r - d.
+static void wall_slot(tal_sim *sim, double dt, tal_law_constants constants, size_t c) {
+  tal_contacts *slots = &sim->wall_contacts;
+  const tal_grain_record *g = &sim->grain_records[slots->i[c]];
+  const tal_wall *wall = &sim->walls.wall[slots->j[c]];
+  tal_wall_point near = tal_wall_nearest(wall, g->x, g->y);
+  tal_meeting m = {.overlap = g->r - near.distance,
+                   .stiffness = slots->stiffness[c],
+                   .damping = slots->damping[c],
+                   .friction = slots->friction[c],
+                   .spring = slots->spring[c],
+                   .spring_stiffness = slots->spring_stiffness[c]};
+  double ux = g->ux - wall->vx, uy = g->uy - wall->vy, hx = g->hx - wall->vx, hy = g->hy - wall->vy;
+  m.approach = -(near.nx * ux + near.ny * uy);
+  m.slip = slip_speed(near.nx, near.ny, ux, uy, m.overlap, g->r * g->spin, g->spin, sim->effects);
+  m.slip_distance = dt * slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r * g->spin, g->spin, sim->effects);
+  tal_law_force f = tal_contact_law(m, constants, sim->effects);
+  slots->nx[c] = near.nx;
+  slots->ny[c] = near.ny;
+  slots->overlap[c] = m.overlap;
+  slots->fe[c] = f.fe;
+  slots->fd[c] = f.fd;
+  slots->ft[c] = f.ft;
+  if (dt > 0) {
+    slots->spring[c] = f.ft;
+    slots->spring_stiffness[c] = f.spring_stiffness;
+  }
+}
+
+void tal_forces_sweep(tal_sim *sim, double dt) {
+  const tal_scene_contact *law = &sim->scene->contact;
+  tal_law_constants constants = {.inverse_vR = 1 / sim->constants.vR,
+                                 .inverse_exponent = 1 / law->exponent,
+                                 .tangential_ratio = sim->constants.tangential_ratio};
+  const size_t blocks = (sim->pairs.count + BLOCK - 1) / BLOCK;
+#pragma omp parallel for schedule(static) if (blocks > 8)
+  for (size_t k = 0; k < blocks; k++) sweep_variant(sim, dt, constants, k * BLOCK);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++) wall_slot(sim, dt, constants, c);
+}
+
+// Geometry and forces of one grain-grain slot, from the centres and the force record.
+static void expand_pair(tal_sim *sim, size_t c) {
   const tal_grains *g = &sim->grains;
-  tal_contacts *slots = &sim->pairs;
-  for (size_t c = 0; c < slots->count; c++) {
-    int32_t i = slots->i[c], j = slots->j[c];
-    slots->slip[c] = slip_speed(slots->nx[c], slots->ny[c], u.x[i] - u.x[j], u.y[i] - u.y[j],
-                                g->r[i] - 0.5 * slots->overlap[c], g->r[j] - 0.5 * slots->overlap[c], u.omega[i],
-                                u.omega[j], TAL_EFFECT_SPIN);
+  tal_contacts *s = &sim->pairs;
+  const tal_force_record *f = &sim->force_records[c];
+  const int32_t i = s->i[c], j = s->j[c];
+  double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j];
+  double distance = sqrt(dx * dx + dy * dy), inverse = 1 / distance;
+  double nx = dx * inverse, ny = dy * inverse;
+  s->nx[c] = nx;
+  s->ny[c] = ny;
+  s->overlap[c] = g->r[i] + g->r[j] - distance;
+  s->fe[c] = f->elastic_x * nx + f->elastic_y * ny;
+  s->fd[c] = f->viscous_x * nx + f->viscous_y * ny;
+  s->ft[c] = sim->effects & TAL_EFFECT_FRICTION ? f->ft : 0;
+  s->slip[c] = slip_speed(nx, ny, g->vx[i] - g->vx[j], g->vy[i] - g->vy[j], 0.5 * s->overlap[c],
+                          g->r[i] * g->omega[i] + g->r[j] * g->omega[j], g->omega[i] + g->omega[j], TAL_EFFECT_SPIN);
+}
+
+void tal_forces_expand(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  for (size_t c = 0; c < sim->pairs.count; c++) expand_pair(sim, c);
+  tal_contacts *s = &sim->wall_contacts;
+  for (size_t c = 0; c < s->count; c++) {
+    int32_t i = s->i[c];
+    const tal_wall *wall = &sim->walls.wall[s->j[c]];
+    s->slip[c] = slip_speed(s->nx[c], s->ny[c], g->vx[i] - wall->vx, g->vy[i] - wall->vy, s->overlap[c],
+                            g->r[i] * g->omega[i], g->omega[i], TAL_EFFECT_SPIN);
   }
-  slots = &sim->wall_contacts;
-  for (size_t c = 0; c < slots->count; c++) {
-    int32_t i = slots->i[c];
-    const tal_wall *wall = &sim->walls.wall[slots->j[c]];
-    slots->slip[c] = slip_speed(slots->nx[c], slots->ny[c], u.x[i] - wall->vx, u.y[i] - wall->vy,
-                                g->r[i] - slots->overlap[c], 0, u.omega[i], 0, TAL_EFFECT_SPIN);
-  }
+}
+
+void tal_forces_see_now(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++)
+    sim->grain_records[i] = (tal_grain_record){g->x[i],  g->y[i],     g->r[i],  g->vx[i],
+                                               g->vy[i], g->omega[i], g->vx[i], g->vy[i]};
 }
 
 // ---- gather ---------------------------------------------------------------------------------------------------------
@@ -197,30 +240,27 @@ TAL_KERNEL void gather_walls(const tal_sim *sim, size_t grain, tal_resultant *su
   }
 }
 
+// Eight doubles at a time: the members of a force record.
+typedef double lanes __attribute__((vector_size(64)));
+
 TAL_KERNEL tal_resultant gather(const tal_sim *sim, size_t grain, unsigned effects) {
-  const tal_contacts *s = &sim->pairs;
+  // on the slot's i all as it stands; on its j the vectors change sign, the torque does not
+  static const lanes signs[2] = {{1, 1, 1, 1, 1, 1, 1, 1}, {-1, -1, -1, -1, -1, -1, 1, 1}};
   const int32_t *slot = sim->neighbours.slot;
-  const double r = sim->grains.r[grain];
-  tal_resultant sum = {0};
+  const lanes *record = (const lanes *)sim->force_records;
+  lanes sum = {0};
   for (int32_t k = sim->neighbours.first[grain]; k < sim->neighbours.first[grain + 1]; k++) {
     int32_t side = slot[k] >> 31; // -1: the grain is the slot's j
-    int32_t c = slot[k] ^ side;
-    double sign = 1 + 2 * side;
-    double nx = sign * s->nx[c], ny = sign * s->ny[c];
-    sum.elastic_x += s->fe[c] * nx;
-    sum.elastic_y += s->fe[c] * ny;
-    if (effects & TAL_EFFECT_DAMPING) {
-      sum.viscous_x += s->fd[c] * nx;
-      sum.viscous_y += s->fd[c] * ny;
-    }
-    if (effects & TAL_EFFECT_FRICTION) {
-      sum.friction_x -= s->ft[c] * ny;
-      sum.friction_y += s->ft[c] * nx;
-      if (effects & TAL_EFFECT_SPIN) sum.torque -= s->ft[c] * (r - 0.5 * s->overlap[c]);
-    }
+    sum += signs[-side] * record[slot[k] ^ side];
   }
-  if (effects & TAL_EFFECT_WALLS) gather_walls(sim, grain, &sum);
-  return sum;
+  tal_resultant f = {.elastic_x = sum[0], .elastic_y = sum[1], .viscous_x = sum[2], .viscous_y = sum[3]};
+  if (effects & TAL_EFFECT_FRICTION) {
+    f.friction_x = sum[4];
+    f.friction_y = sum[5];
+    if (effects & TAL_EFFECT_SPIN) f.torque = sum[7] - sim->grains.r[grain] * sum[6];
+  }
+  if (effects & TAL_EFFECT_WALLS) gather_walls(sim, grain, &f);
+  return f;
 }
 
 tal_resultant tal_forces_gather(const tal_sim *sim, size_t grain) {
@@ -277,27 +317,33 @@ TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects
   }
 }
 
-TAL_KERNEL void finish_all(tal_sim *sim, double dt, unsigned effects) {
-#pragma omp parallel for schedule(static) if (sim->grains.count > 500)
-  for (size_t i = 0; i < sim->grains.count; i++) finish_grain(sim, i, dt, effects);
+TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, unsigned effects) {
+  for (size_t i = start; i < end; i++) finish_grain(sim, i, dt, effects);
 }
 
-// A biaxial test with friction, without, and the rest by the run-time mask.
-void tal_forces_finish_step(tal_sim *sim, double dt) {
+// A biaxial test with either friction or none; the rest by the run-time mask.
+static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt) {
   const unsigned biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_WALLS | TAL_EFFECT_BOUNDARY;
   const unsigned kinds = TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY |
                          TAL_EFFECT_BOUNDARY | TAL_EFFECT_WALLS | TAL_EFFECT_HELD;
   switch (sim->effects & kinds) {
   case biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN:
-    finish_all(sim, dt, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
     break;
   case biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN:
-    finish_all(sim, dt, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
     break;
   case biaxial:
-    finish_all(sim, dt, biaxial);
+    finish_chunk(sim, start, end, dt, biaxial);
     break;
   default:
-    finish_all(sim, dt, sim->effects & kinds);
+    finish_chunk(sim, start, end, dt, sim->effects & kinds);
   }
+}
+
+void tal_forces_finish_step(tal_sim *sim, double dt) {
+  const size_t count = sim->grains.count, chunks = (count + CHUNK - 1) / CHUNK;
+#pragma omp parallel for schedule(static) if (chunks > 1)
+  for (size_t k = 0; k < chunks; k++)
+    finish_variant(sim, k * CHUNK, (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count, dt);
 }

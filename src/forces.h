@@ -5,17 +5,14 @@
 
 #include "sim.h"
 
-// Which velocities the laws see. All arrays [n].
-typedef struct tal_velocities {
-  const double *x, *y, *omega;                // [m/s, m/s, rad/s] at the instant of the positions
-  const double *half_x, *half_y, *half_omega; // in the middle of the step: they move the tangential springs
-  double dt;                                  // [s] by which the springs move; 0: an observation, histories are left alone
-} tal_velocities;
-
-// Fills nx, ny, overlap, fe, fd, ft (and, where dt > 0, the spring history) of every slot, grain-grain and grain-wall.
-void tal_forces_sweep(tal_sim *sim, tal_velocities velocities);
-// Also fills slip (observed states only).
-void tal_forces_slip(tal_sim *sim, tal_velocities velocities);
+// Forces of every slot from the grain records: force records of the grain-grain slots, nx ... ft of the wall slots. dt [s]
+// moves the tangential springs; 0: an observation, histories are left alone.
+void tal_forces_sweep(tal_sim *sim, double dt);
+// Grain records of this very instant: centres and velocities as they stand.
+void tal_forces_see_now(tal_sim *sim);
+// Fills nx, ny, overlap, fe, fd, ft of the grain-grain slots from the force records, and slip of all slots from the
+// velocities as they stand. For those who look at contacts between steps; a step does without.
+void tal_forces_expand(tal_sim *sim);
 
 // Sums over the slots of one grain.
 typedef struct tal_resultant {

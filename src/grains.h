@@ -29,9 +29,6 @@
   X(double, window_vy, "m/s", STATE, "velocity when the window of mean forces began")                                  \
   X(double, bx, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
   X(double, by, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
-  X(double, ux, "m/s", WORK, "velocity the contact laws see: predicted for the end of the step")                       \
-  X(double, uy, "m/s", WORK, "velocity the contact laws see: predicted for the end of the step")                       \
-  X(double, uomega, "rad/s", WORK, "spin the contact laws see")                                                        \
   X(double, rx, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
   X(double, ry, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
   X(double, rtorque, "N m", WORK, "observed resultant torque")                                                         \

@@ -8,38 +8,44 @@
 #include "neighbours.h"
 #include "walls_load.h"
 
-// First half kick, drift, prediction.
-TAL_KERNEL void drift(tal_grains *g, double dt, unsigned effects) {
-#pragma omp parallel for simd schedule(static) if (g->count > 2000)
-  for (size_t i = 0; i < g->count; i++) {
+enum { CHUNK = 512 };
+
+// First half kick, drift, prediction of the grains in [start, end); what the laws shall see goes into the records.
+TAL_KERNEL void drift(tal_grains *g, tal_grain_record *record, size_t start, size_t end, double dt, unsigned effects) {
+  for (size_t i = start; i < end; i++) {
     double kick_x = 0.5 * dt * (g->fx[i] * g->inverse_mass[i]), kick_y = 0.5 * dt * (g->fy[i] * g->inverse_mass[i]);
     double vx = g->vx[i] + kick_x, vy = g->vy[i] + kick_y;
-    g->x[i] += dt * vx;
-    g->y[i] += dt * vy;
-    g->vx[i] = vx;
-    g->vy[i] = vy;
-    g->ux[i] = vx + kick_x;
-    g->uy[i] = vy + kick_y;
+    double x = g->x[i] + dt * vx, y = g->y[i] + dt * vy, spin = 0;
     if (effects & TAL_EFFECT_SPIN) {
       double turn = 0.5 * dt * (g->torque[i] * g->inverse_inertia[i]);
       double omega = g->omega[i] + turn;
       g->theta[i] += dt * omega;
       g->omega[i] = omega;
-      g->uomega[i] = omega + turn;
+      spin = effects & TAL_EFFECT_SPRING ? omega : omega + turn;
     }
+    g->x[i] = x;
+    g->y[i] = y;
+    g->vx[i] = vx;
+    g->vy[i] = vy;
+    record[i] = (tal_grain_record){x, y, g->r[i], vx + kick_x, vy + kick_y, spin, vx, vy};
+  }
+}
+
+static void drift_all(tal_sim *sim) {
+  const size_t count = sim->grains.count, chunks = (count + CHUNK - 1) / CHUNK;
+#pragma omp parallel for schedule(static) if (chunks > 3)
+  for (size_t k = 0; k < chunks; k++) {
+    size_t end = (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count;
+    drift(&sim->grains, sim->grain_records, k * CHUNK, end, sim->dt, sim->effects);
   }
 }
 
 static void advance(tal_sim *sim) {
-  tal_grains *g = &sim->grains;
-  if (sim->effects & TAL_EFFECT_SPIN)
-    drift(g, sim->dt, TAL_EFFECT_SPIN);
-  else
-    drift(g, sim->dt, 0);
+  drift_all(sim);
   if (sim->effects & TAL_EFFECT_WALLS) tal_walls_drift(sim);
   if (tal_neighbours_stale(sim)) tal_neighbours_rebuild(sim);
   if (sim->boundary) sim->boundary->apply(sim);
-  tal_forces_sweep(sim, (tal_velocities){g->ux, g->uy, g->uomega, g->vx, g->vy, g->omega, sim->dt});
+  tal_forces_sweep(sim, sim->dt);
   tal_forces_finish_step(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_WALLS) tal_walls_take_loads(sim, sim->dt);
 }

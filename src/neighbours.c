@@ -83,6 +83,8 @@ static void list_pairs(tal_sim *sim) {
   if (sim->effects & TAL_EFFECT_SPRING) carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
+  free(sim->force_records);
+  sim->force_records = tal_alloc(sim->pairs.capacity, sizeof *sim->force_records);
 }
 
 // A wall that vanishes takes the elastic energy of its contacts with it.
@@ -146,6 +148,8 @@ void tal_neighbours_rebuild(tal_sim *sim) {
     free(n->wall_first);
     n->first = tal_alloc(g->count + 1, sizeof *n->first);
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
+    free(sim->grain_records);
+    sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
     n->grain_capacity = g->count;
   }
   list_pairs(sim);

@@ -5,7 +5,7 @@
 void tal_plates_ensure(tal_sim *sim) {
   if (tal_walls_plate(&sim->walls, +1)) return;
   const tal_grains *g = &sim->grains;
-  double bottom = INFINITY, top = -INFINITY;
+  double bottom = (double)INFINITY, top = -(double)INFINITY;
   for (size_t i = 0; i < g->count; i++) {
     bottom = fmin(bottom, g->y[i] - g->r[i]);
     top = fmax(top, g->y[i] + g->r[i]);

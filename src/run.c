@@ -7,6 +7,7 @@
 #include <math.h>
 #include <omp.h>
 #include <signal.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -43,13 +44,46 @@ typedef struct job {
   tal_stage_report *stages; // owned; [stage_count]
   double started, stage_started;
   int64_t stage_first_step, first_step;
+  double wall_before; // [s] of the parts of the run before this one
+  int cores;
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
+// What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
+static size_t warnings(const job *this, char text[200], const char *out[1]) {
+  double friction = tal_friction_step(this->sim, this->sim->run.pressure);
+  if (!(this->sim->dt > friction)) return 0;
+  snprintf(text, 200,
+           "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
+           this->sim->dt, friction);
+  out[0] = text;
+  return 1;
+}
+
+static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
+  double took = clock_now() - this->started;
+  int64_t steps = this->sim->run.step - this->first_step;
+  char text[200];
+  const char *sentences[1];
+  tal_run_report report = {
+      .status = name,
+      .reason = reason,
+      .cores = this->cores,
+      .wall_time = this->wall_before + took,
+      .grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0,
+      .energy_residual = this->row.energy_residual,
+      .stages = this->stages,
+      .stage_count = this->scene->stage_count,
+      .warnings = sentences,
+      .warning_count = warnings(this, text, sentences)};
+  return tal_output_report(this->output, this->sim, &report, err);
+}
+
 static tal_status write_checkpoint(job *this, tal_error *err) {
   tal_status status = tal_output_checkpoint(this->output, this->sim, err);
-  if (status == TAL_OK) this->checkpoint = true;
-  return status;
+  if (status) return status;
+  this->checkpoint = true;
+  return report_run(this, "running", "", err);
 }
 
 // Whole number of steps nearest to `every`, at least 1; 0 for never.
@@ -99,25 +133,6 @@ static void account_stage(job *this, int64_t stage) {
   this->stage_first_step = this->sim->run.step;
 }
 
-static tal_status report_run(job *this, const char *name, const char *reason, int cores, tal_run_result *result,
-                             tal_error *err) {
-  double took = clock_now() - this->started;
-  int64_t steps = this->sim->run.step - this->first_step;
-  result->row = this->row;
-  result->wall_time = took;
-  result->grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0;
-  result->critical_step = this->sim->dt / this->row.dt_ratio;
-  tal_run_report report = {.status = name,
-                           .reason = reason,
-                           .cores = cores,
-                           .wall_time = took,
-                           .grain_steps_per_second = result->grain_steps_per_second,
-                           .energy_residual = this->row.energy_residual,
-                           .stages = this->stages,
-                           .stage_count = this->scene->stage_count};
-  return tal_output_report(this->output, this->sim, &report, err);
-}
-
 static tal_status advance(job *this, tal_error *err) {
   while (!tal_sim_done(this->sim)) {
     if (asked_to_stop) return TAL_INTERRUPTED;
@@ -135,19 +150,18 @@ static tal_status advance(job *this, tal_error *err) {
 }
 
 // Steps until done, then says in run.json how it ended.
-static tal_status run_job(job *this, int cores, tal_run_result *result, tal_error *err) {
+static tal_status run_job(job *this, tal_error *err) {
   tal_status status = advance(this, err), reported;
-  if (status == TAL_OK && this->scene->stage_count == 0) status = write_checkpoint(this, err);
   if (status != TAL_OK && this->scene->stage_count) account_stage(this, this->sim->run.stage);
   switch (status) {
   case TAL_OK:
-    return report_run(this, "done", "", cores, result, err);
+    return report_run(this, "done", "", err);
   case TAL_INTERRUPTED:
     if ((reported = write_checkpoint(this, err))) return reported;
-    if ((reported = report_run(this, "interrupted", "", cores, result, err))) return reported;
+    if ((reported = report_run(this, "interrupted", "", err))) return reported;
     return status;
   case TAL_INVALID:
-    report_run(this, "invalid", err ? err->text : "", cores, result, NULL);
+    report_run(this, "invalid", err ? err->text : "", NULL);
     return status;
   default:
     return status;
@@ -157,31 +171,54 @@ static tal_status run_job(job *this, int cores, tal_run_result *result, tal_erro
 static tal_status open_output(job *this, const tal_run_options *options, bool *finished, tal_error *err) {
   *finished = false;
   if (options->resume) return tal_output_resume(&this->output, options->dir, this->scene, this->sim, finished, err);
-  tal_status status = tal_output_create(&this->output, options->dir, this->scene, err);
-  if (status) return status;
-  return write_row(this, true, err);
+  return tal_output_create(&this->output, options->dir, this->scene, err);
+}
+
+// Clocks and stage reports, continued where an earlier part of the run left them.
+static void begin_accounts(job *this) {
+  const tal_stage_report *before = tal_output_stages_before(this->output);
+  this->stages = tal_alloc(this->scene->stage_count + 1, sizeof *this->stages);
+  for (size_t s = 0; s < this->scene->stage_count; s++) {
+    this->stages[s] = before[s];
+    this->stages[s].kind = this->scene->stages[s].kind;
+    this->wall_before += before[s].wall_time;
+  }
+  this->started = this->stage_started = clock_now();
+  this->first_step = this->stage_first_step = this->sim->run.step;
+}
+
+static void fill_result(const job *this, tal_run_result *result) {
+  int64_t steps = this->sim->run.step - this->first_step;
+  result->row = this->row;
+  result->wall_time = clock_now() - this->started;
+  result->grain_steps_per_second = (double)steps * (double)this->sim->grains.count / result->wall_time;
+  result->checkpoint = this->checkpoint;
+}
+
+static tal_status run_opened(job *this, const tal_run_options *options, tal_run_result *result, tal_error *err) {
+  tal_status status = TAL_OK;
+  begin_accounts(this);
+  if (!options->resume && (status = write_row(this, true, err)) == TAL_OK) status = write_checkpoint(this, err);
+  tal_progress_begin(&this->progress, this->sim, options->quiet);
+  if (status == TAL_OK) status = run_job(this, err);
+  tal_progress_end(&this->progress);
+  fill_result(this, result);
+  free(this->stages);
+  return status;
 }
 
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err) {
-  int cores = options->threads > 0 ? options->threads : omp_get_num_procs();
-  omp_set_num_threads(cores);
   *result = (tal_run_result){0};
   job run = {.scene = scene, .checkpoint = options->resume};
+  run.cores = options->threads > 0 ? options->threads : omp_get_num_procs();
+  omp_set_num_threads(run.cores);
   tal_status status = tal_sim_create(&run.sim, scene, err);
-  if (status) return status;
-  catch_signals();
-  status = open_output(&run, options, &result->already_done, err);
+  if (status == TAL_OK) status = tal_output_check_tracks(scene, run.sim->grains.count, err);
+  if (status == TAL_OK) status = open_output(&run, options, &result->already_done, err);
   if (status == TAL_OK && !result->already_done) {
-    run.stages = tal_alloc(scene->stage_count + 1, sizeof *run.stages);
-    for (size_t s = 0; s < scene->stage_count; s++) run.stages[s].kind = scene->stages[s].kind;
-    run.started = run.stage_started = clock_now();
-    run.first_step = run.stage_first_step = run.sim->run.step;
-    tal_progress_begin(&run.progress, run.sim, options->quiet);
-    status = run_job(&run, cores, result, err);
-    tal_progress_end(&run.progress);
-    free(run.stages);
-    result->checkpoint = run.checkpoint;
+    catch_signals();
+    status = run_opened(&run, options, result, err);
   }
   if (run.output) tal_output_close(run.output);
   tal_sim_free(run.sim);

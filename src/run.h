@@ -17,7 +17,6 @@ typedef struct tal_run_result {
   bool checkpoint;            // dir holds a good checkpoint of this run
   double wall_time;           // [s] of this process
   double grain_steps_per_second;
-  double critical_step;       // [s] at the last state
 } tal_run_result;
 
 // Runs the scene into options->dir. Returns TAL_OK, TAL_BAD_INPUT, TAL_INVALID (the last good checkpoint stays), TAL_IO,

@@ -22,7 +22,7 @@ static double plane_modulus(double young, double poisson) { return young / (1 - 
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
     if (scene->stages[s].rate > 0) return scene->stages[s].rate;
-  return NAN;
+  return (double)NAN;
 }
 
 static void set_constants(tal_sim *sim) {
@@ -134,7 +134,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   sim->run.kinetic0 = tal_energy_kinetic(&sim->grains);
   sim->run.elastic0 = tal_energy_elastic(sim);
   sim->run.gravity0 = tal_energy_gravity(&sim->grains, scene->gravity);
-  sim->run.rest = INFINITY;
+  sim->run.rest = (double)INFINITY;
   status = tal_step_inspect(sim, err);
   if (status == TAL_OK && scene->stage_count) status = tal_step_begin_stage(sim, err);
   if (status) {
@@ -152,6 +152,8 @@ void tal_sim_free(tal_sim *sim) {
   tal_contacts_clear(&sim->wall_contacts);
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
+  free(sim->grain_records);
+  free(sim->force_records);
   tal_graph_clear(&sim->graph);
   free(sim);
 }
@@ -168,19 +170,16 @@ bool tal_sim_done(const tal_sim *sim) {
          (sim->run.stage_done && (size_t)sim->run.stage + 1 >= sim->scene->stage_count);
 }
 
-static tal_velocities velocities_now(const tal_grains *g) {
-  return (tal_velocities){g->vx, g->vy, g->omega, g->vx, g->vy, g->omega, 0};
-}
-
 tal_observed tal_sim_observe(tal_sim *sim) {
   if (sim->boundary && sim->graph.valid) sim->boundary->apply(sim);
-  tal_forces_sweep(sim, velocities_now(&sim->grains));
+  tal_forces_see_now(sim);
+  tal_forces_sweep(sim, 0);
   return tal_sim_driving(sim);
 }
 
 tal_observed tal_sim_driving(tal_sim *sim) {
   tal_grains *g = &sim->grains;
-  tal_forces_slip(sim, velocities_now(g));
+  tal_forces_expand(sim);
   tal_forces_resultants(sim);
   return (tal_observed){.grains = g,
                         .pairs = &sim->pairs,
@@ -265,4 +264,5 @@ void tal_sim_restored(tal_sim *sim) {
   }
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);
+  tal_sim_observe(sim); // overlaps: a wall that vanishes in the next step takes its contacts' energy along
 }

@@ -7,6 +7,7 @@
 #include "grains.h"
 #include "neighbours.h"
 #include "pack.h"
+#include "records.h"
 #include "scene.h"
 #include "walls.h"
 
@@ -120,6 +121,8 @@ struct tal_sim {
   tal_contacts pairs;           // grain-grain slots
   tal_contacts wall_contacts;   // grain-wall slots
   tal_walls walls;
+  tal_grain_record *grain_records; // owned; [grains] what the contact laws see
+  tal_force_record *force_records; // owned; [pairs.capacity] what they answer
   tal_neighbours neighbours;
   tal_graph graph;
   tal_run run;

@@ -28,7 +28,7 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
   sim->boundary = &tal_boundary_pressure;
   sim->run.bedding = 1;
   sim->run.pressure = 0;
-  sim->run.rest = INFINITY;
+  sim->run.rest = (double)INFINITY;
   open_window(sim);
   (void)plan;
   return TAL_OK;

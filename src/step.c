@@ -206,6 +206,7 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   tal_integrator_find(plan->integrator.scheme)->advance(sim); // (12)-(17)
   run->force_evaluations++;
   if (run->step % INSPECT_EVERY == 0) {
+    tal_forces_expand(sim);
     if ((status = tal_step_inspect(sim, err))) return status;
     if ((status = check_step(sim, err))) return status;
   }

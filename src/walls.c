@@ -16,7 +16,7 @@ tal_wall *tal_walls_add(tal_walls *walls) {
     walls->capacity = walls->capacity * 2 + 4;
   }
   tal_wall *wall = &walls->wall[walls->count++];
-  *wall = (tal_wall){.from_time = -INFINITY, .until_time = INFINITY};
+  *wall = (tal_wall){.from_time = -(double)INFINITY, .until_time = (double)INFINITY};
   return wall;
 }
 

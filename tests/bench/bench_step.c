@@ -1,0 +1,130 @@
+// Grain-steps per second on one core in a confined assembly under compression, and the share of each phase of a step.
+// CPU time of the one thread, median of REPEATS; the assembly is a drop-and-roll packing whose radii are swollen until
+// its contacts carry the overlap of 100 kPa. Usage: bench_step [N ...] (default 4000 100000).
+#include "forces.h"
+#include "integrate.h"
+#include "neighbours.h"
+#include "sim.h"
+#include "step.h"
+
+#include <omp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { REPEATS = 7 };
+
+typedef struct variant {
+  const char *name;
+  const char *contact; // YAML
+  double friction;
+  const char *rotation;
+} variant;
+
+static const variant variants[] = {
+    {"hertz, damping, regularised, rotation", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true"},
+    {"hertz, damping, spring, rotation", "{normal: hertz, tangential: spring}", 0.45, "true"},
+    {"hertz, damping", "{normal: hertz, tangential: none}", 0, "true"},
+    {"linear", "{normal: linear, tangential: none, stiffness: 5e5}", 0, "true"},
+};
+
+static double cpu_seconds(void) {
+  struct timespec now;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static int ascending(const void *a, const void *b) {
+  double x = *(const double *)a, y = *(const double *)b;
+  return (x > y) - (x < y);
+}
+
+static tal_sim *create(const variant *v, int n, tal_scene *scene) {
+  char path[] = "/tmp/talus-bench-XXXXXX";
+  int file = mkstemp(path);
+  FILE *out = fdopen(file, "w");
+  fprintf(out,
+          "grains: {count: %d, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+          "material: {young: 30e9, poisson: 0.3, density: 2675, friction: %g%s}\n"
+          "mass_scaling: 1e5\ncontact: %s\nrotation: %s\n"
+          "pack: {method: drop_and_roll, width: %g}\nintegrator: {dt: 1e-5}\n"
+          "stages: [{kind: compress, pressure: 100e3, rate: 5e-3, strain: 0.2}]\n",
+          n, v->friction, strcmp(v->name, "linear") ? ", damping: 0.002" : "", v->contact, v->rotation,
+          1e-3 * sqrt(n));
+  fclose(out);
+  tal_scene_errors errors;
+  tal_error err;
+  tal_sim *sim = NULL;
+  if (tal_scene_load(scene, path, NULL, 0, &errors))
+    fprintf(stderr, "%s\n", errors.item[0].text);
+  else if (tal_sim_create(&sim, scene, &err))
+    fprintf(stderr, "%s\n", err.text);
+  unlink(path);
+  if (!sim) exit(1);
+  for (size_t i = 0; i < sim->grains.count; i++) sim->grains.r[i] *= 1.0004;
+  tal_neighbours_rebuild(sim);
+  return sim;
+}
+
+static void steps(tal_sim *sim, int count) {
+  tal_error err;
+  for (int k = 0; k < count; k++)
+    if (tal_sim_step(sim, &err)) {
+      fprintf(stderr, "%s\n", err.text);
+      exit(1);
+    }
+}
+
+// Median CPU seconds of `count` calls.
+static double phase(void (*body)(tal_sim *), tal_sim *sim, int count) {
+  double time[REPEATS];
+  for (int r = 0; r < REPEATS; r++) {
+    double start = cpu_seconds();
+    for (int k = 0; k < count; k++) body(sim);
+    time[r] = cpu_seconds() - start;
+  }
+  qsort(time, REPEATS, sizeof *time, ascending);
+  return time[REPEATS / 2] / count;
+}
+
+static void one_step(tal_sim *sim) { steps(sim, 1); }
+static void sweep(tal_sim *sim) { tal_forces_sweep(sim, 0); }
+static void finish(tal_sim *sim) { tal_forces_finish_step(sim, 0); }
+static void rebuild(tal_sim *sim) { tal_neighbours_rebuild(sim); }
+static void refresh(tal_sim *sim) { tal_step_refresh(sim, NULL); }
+
+static void measure(const variant *v, int n) {
+  tal_scene scene;
+  tal_sim *sim = create(v, n, &scene);
+  steps(sim, 300);
+  uint64_t rebuilds = sim->neighbours.rebuilds;
+  int count = n > 20000 ? 250 : 2500;
+  double step = phase(one_step, sim, count);
+  double grains = (double)sim->grains.count, listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
+  int few = count / 10;
+  double t_sweep = phase(sweep, sim, few), t_finish = phase(finish, sim, few), t_list = phase(rebuild, sim, few / 10),
+         t_graph = phase(refresh, sim, few / 10) / 250;
+  double rest = step - t_sweep - t_finish - t_list * listed - t_graph;
+  printf("%-40s %8d %7.1f   contacts %4.1f  gather+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
+         "%.2f\n",
+         v->name, n, 1e-6 * grains / step, 100 * t_sweep / step, 100 * t_finish / step, 100 * t_list * listed / step,
+         100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
+  fflush(stdout);
+  tal_sim_free(sim);
+  tal_scene_clear(&scene);
+}
+
+int main(int argc, char **argv) {
+  omp_set_num_threads(1);
+  printf("%-40s %8s %7s   share of a step [%%]\n", "variant", "N", "M gs/s");
+  for (size_t v = 0; v < sizeof variants / sizeof *variants; v++) {
+    if (argc == 1) {
+      measure(&variants[v], 4000);
+      measure(&variants[v], 100000);
+    }
+    for (int k = 1; k < argc; k++) measure(&variants[v], atoi(argv[k]));
+  }
+  return 0;
+}
