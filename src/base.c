@@ -6,7 +6,8 @@
 #include <string.h>
 
 tal_status tal_fail(tal_error *err, tal_status status, const char *format, ...) {
-  if (!err) return status;
+  if (!err)
+    return status;
   va_list args;
   va_start(args, format);
   vsnprintf(err->text, sizeof err->text, format, args);
@@ -20,7 +21,8 @@ void *tal_alloc(size_t count, size_t size) {
   if (size == 0 || count <= (SIZE_MAX - align) / size) {
     size_t bytes = (count * size + align - 1) / align * align;
     memory = aligned_alloc(align, bytes ? bytes : align);
-    if (memory) memset(memory, 0, bytes ? bytes : align);
+    if (memory)
+      memset(memory, 0, bytes ? bytes : align);
   }
   if (!memory) {
     fprintf(stderr, "talus: out of memory (%zu elements of %zu bytes)\n", count, size);
@@ -31,7 +33,8 @@ void *tal_alloc(size_t count, size_t size) {
 
 void *tal_grow(void *old, size_t old_count, size_t count, size_t size) {
   void *memory = tal_alloc(count, size);
-  if (old) memcpy(memory, old, (old_count < count ? old_count : count) * size);
+  if (old)
+    memcpy(memory, old, (old_count < count ? old_count : count) * size);
   free(old);
   return memory;
 }

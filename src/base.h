@@ -8,10 +8,10 @@
 // Also the program's exit codes.
 typedef enum tal_status {
   TAL_OK = 0,
-  TAL_BAD_INPUT = 2,    // the user's input
-  TAL_INVALID = 3,      // a run gone bad
-  TAL_IO = 4,           // files
-  TAL_INTERRUPTED = 75  // stopped on request, resumable
+  TAL_BAD_INPUT = 2,   // the user's input
+  TAL_INVALID = 3,     // a run gone bad
+  TAL_IO = 4,          // files
+  TAL_INTERRUPTED = 75 // stopped on request, resumable
 } tal_status;
 
 // One readable sentence for the user.

@@ -6,7 +6,8 @@ static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, NULL};
 
 const tal_boundary *tal_boundary_find(const char *name) {
   for (const tal_boundary *const *k = boundaries; *k; k++)
-    if (!strcmp((*k)->name, name)) return *k;
+    if (!strcmp((*k)->name, name))
+      return *k;
   return NULL;
 }
 

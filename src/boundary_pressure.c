@@ -1,7 +1,7 @@
 // Pressure on the Delaunay boundary, eq (22) [P 2.5, 3.2]: each edge of the loop carries p h times its length along the
 // inward normal, half to each end. On a closed loop that is a force and moment free system of uniform stress p.
-// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest. While
-// the plates bed a packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
+// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest.
+// While the plates bed a packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
 #include "boundary.h"
 
 #include <stdlib.h>
@@ -12,7 +12,8 @@ static void touching(const tal_sim *sim, int side, unsigned char *mark) {
   const tal_contacts *s = &sim->wall_contacts;
   memset(mark, 0, sim->grains.count);
   for (size_t c = 0; c < s->count; c++)
-    if (s->overlap[c] > 0 && sim->walls.wall[s->j[c]].plate == side) mark[s->i[c]] = 1;
+    if (s->overlap[c] > 0 && sim->walls.wall[s->j[c]].plate == side)
+      mark[s->i[c]] = 1;
 }
 
 // Loop places of the leftmost and rightmost grain touching the plate; the grain nearest the plate when none touches.
@@ -24,12 +25,17 @@ static void plate_ends(const tal_sim *sim, int side, unsigned char *mark, int64_
   *left = *right = -1;
   for (int64_t k = 0; k < (int64_t)loop->count; k++) {
     int32_t i = loop->node[k], n = loop->node[nearest];
-    if (side * g->y[i] - g->r[i] < side * g->y[n] - g->r[n]) nearest = k;
-    if (!mark[i]) continue;
-    if (*left < 0 || g->x[i] < g->x[loop->node[*left]]) *left = k;
-    if (*right < 0 || g->x[i] > g->x[loop->node[*right]]) *right = k;
+    if (side * g->y[i] - g->r[i] < side * g->y[n] - g->r[n])
+      nearest = k;
+    if (!mark[i])
+      continue;
+    if (*left < 0 || g->x[i] < g->x[loop->node[*left]])
+      *left = k;
+    if (*right < 0 || g->x[i] > g->x[loop->node[*right]])
+      *right = k;
   }
-  if (*left < 0) *left = *right = nearest;
+  if (*left < 0)
+    *left = *right = nearest;
 }
 
 // Loop places furthest out along the diagonals on the plate's side.
@@ -39,8 +45,10 @@ static void corners(const tal_sim *sim, int side, int64_t *left, int64_t *right)
   *left = *right = 0;
   for (int64_t k = 0; k < (int64_t)loop->count; k++) {
     int32_t i = loop->node[k], l = loop->node[*left], r = loop->node[*right];
-    if (-g->x[i] - side * g->y[i] > -g->x[l] - side * g->y[l]) *left = k;
-    if (g->x[i] - side * g->y[i] > g->x[r] - side * g->y[r]) *right = k;
+    if (-g->x[i] - side * g->y[i] > -g->x[l] - side * g->y[l])
+      *left = k;
+    if (g->x[i] - side * g->y[i] > g->x[r] - side * g->y[r])
+      *right = k;
   }
 }
 
@@ -94,7 +102,8 @@ static void apply(tal_sim *sim) {
     memset(g->by, 0, g->count * sizeof *g->by);
     sim->boundary_moved = false;
   }
-  for (size_t k = 0; k < loop->count; k++) g->bx[loop->node[k]] = g->by[loop->node[k]] = 0;
+  for (size_t k = 0; k < loop->count; k++)
+    g->bx[loop->node[k]] = g->by[loop->node[k]] = 0;
   if (!tal_walls_plate(&sim->walls, +1)) {
     press_arc(sim, 0, loop->count);
     return;

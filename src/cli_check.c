@@ -13,11 +13,18 @@ static void print_effects(const tal_sim *sim) {
   static const struct {
     unsigned bit;
     const char *name;
-  } names[] = {{TAL_EFFECT_HERTZ, "hertz"},       {TAL_EFFECT_DAMPING, "damping"}, {TAL_EFFECT_REGULARISED, "regularised friction"},
-               {TAL_EFFECT_SPRING, "spring friction"}, {TAL_EFFECT_SPIN, "rotation"},   {TAL_EFFECT_GRAVITY, "gravity"},
-               {TAL_EFFECT_BOUNDARY, "boundary forces"}, {TAL_EFFECT_WALLS, "walls or plates"}, {TAL_EFFECT_HELD, "driven grains"}};
+  } names[] = {{TAL_EFFECT_HERTZ, "hertz"},
+               {TAL_EFFECT_DAMPING, "damping"},
+               {TAL_EFFECT_REGULARISED, "regularised friction"},
+               {TAL_EFFECT_SPRING, "spring friction"},
+               {TAL_EFFECT_SPIN, "rotation"},
+               {TAL_EFFECT_GRAVITY, "gravity"},
+               {TAL_EFFECT_BOUNDARY, "boundary forces"},
+               {TAL_EFFECT_WALLS, "walls or plates"},
+               {TAL_EFFECT_HELD, "driven grains"}};
   printf("effects       ");
-  if (!(sim->effects & TAL_EFFECT_HERTZ)) printf("linear contact");
+  if (!(sim->effects & TAL_EFFECT_HERTZ))
+    printf("linear contact");
   const char *comma = sim->effects & TAL_EFFECT_HERTZ ? "" : ", ";
   for (size_t k = 0; k < sizeof names / sizeof *names; k++)
     if (sim->effects & names[k].bit) {
@@ -53,8 +60,10 @@ static double planned_steps(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_stage *stage = &scene->stages[s];
     double duration = stage->duration > 0 ? stage->duration : 0;
-    if (stage->ramp > 0) duration = 2 * stage->ramp;
-    if (stage->rate > 0) duration = stage->strain / stage->rate;
+    if (stage->ramp > 0)
+      duration = 2 * stage->ramp;
+    if (stage->rate > 0)
+      duration = stage->strain / stage->rate;
     steps += duration / stage->integrator.dt;
   }
   return steps;
@@ -66,7 +75,8 @@ static double measured_rate(tal_sim *sim) {
   int64_t steps = 0;
   while (took < 0.5 && !tal_sim_done(sim)) {
     for (int k = 0; k < 20; k++)
-      if (tal_sim_step(sim, NULL)) return steps ? (double)steps / (clock_now() - started) : (double)NAN;
+      if (tal_sim_step(sim, NULL))
+        return steps ? (double)steps / (clock_now() - started) : (double)NAN;
     steps += 20;
     took = clock_now() - started;
   }
@@ -75,13 +85,15 @@ static double measured_rate(tal_sim *sim) {
 
 static double first_pressure(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].pressure > 0) return scene->stages[s].pressure;
+    if (scene->stages[s].pressure > 0)
+      return scene->stages[s].pressure;
   return (double)NAN;
 }
 
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0) return scene->stages[s].rate;
+    if (scene->stages[s].rate > 0)
+      return scene->stages[s].rate;
   return (double)NAN;
 }
 
@@ -102,10 +114,12 @@ static void print_numbers(const tal_sim *sim) {
          sim->grains.count, k->mean_radius, k->thickness, k->mean_mass, scene->mass_scaling);
   printf("packing       height %.5g m, solid fraction %.4f, coordination %.3f, largest overlap %.2g m\n", height,
          sim->packing_solid_fraction, sim->packing_coordination, sim->packing_overlap);
-  if (isfinite(k->vR)) printf("vR            %.5g m/s\n", k->vR);
+  if (isfinite(k->vR))
+    printf("vR            %.5g m/s\n", k->vR);
   double now = tal_critical_step(sim), confined = tal_critical_step_scene(scene, k, k->mean_mass / 2);
   printf("dt/dt_crit    %.3g on the packed grains", scene->integrator.dt / now);
-  if (isfinite(confined)) printf(", %.3g for two mean grains under the load of the scene", scene->integrator.dt / confined);
+  if (isfinite(confined))
+    printf(", %.3g for two mean grains under the load of the scene", scene->integrator.dt / confined);
   printf("\n");
   double friction = tal_friction_step(sim, pressure);
   if (isfinite(friction))
@@ -119,7 +133,8 @@ static void print_numbers(const tal_sim *sim) {
 static void print_cost(tal_sim *sim) {
   double steps = planned_steps(sim->scene), grains = (double)sim->grains.count;
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
-  if (steps == 0) return;
+  if (steps == 0)
+    return;
   double rate = measured_rate(sim);
   printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps, 1e-6 * rate * grains,
          steps / rate);
@@ -128,7 +143,8 @@ static void print_cost(tal_sim *sim) {
 int tal_cli_check(int argc, char **argv) {
   tal_cli_options options;
   int exit_code;
-  if (!tal_cli_options_parse(&options, "check", TAL_CLI_SET, "SCENE.yaml", argc, argv, &exit_code)) return exit_code;
+  if (!tal_cli_options_parse(&options, "check", TAL_CLI_SET, "SCENE.yaml", argc, argv, &exit_code))
+    return exit_code;
   tal_scene scene;
   tal_scene_errors errors;
   tal_error err;

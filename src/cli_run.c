@@ -11,15 +11,18 @@ static void print_summary(const tal_run_result *result, const char *dir) {
   printf("%s: t = %g s, %.0f steps, %.3g s, %.3g million grain-steps/s\n", dir, row->time, row->step, result->wall_time,
          1e-6 * result->grain_steps_per_second);
   if (isfinite(row->sigma_xx))
-    printf("  stress      sigma_xx %.5g Pa, sigma_yy %.5g Pa; from boundary forces %.5g, %.5g Pa, inertia %.2g, %.2g Pa\n",
-           row->sigma_xx, row->sigma_yy, row->sigma_xx_boundary, row->sigma_yy_boundary, row->sigma_xx_inertia,
-           row->sigma_yy_inertia);
+    printf(
+        "  stress      sigma_xx %.5g Pa, sigma_yy %.5g Pa; from boundary forces %.5g, %.5g Pa, inertia %.2g, %.2g Pa\n",
+        row->sigma_xx, row->sigma_yy, row->sigma_xx_boundary, row->sigma_yy_boundary, row->sigma_xx_inertia,
+        row->sigma_yy_inertia);
   if (row->axial_strain > 0)
-    printf("  strain      axial %.4g, volumetric %.4g (dilation positive)\n", row->axial_strain, row->volumetric_strain);
+    printf("  strain      axial %.4g, volumetric %.4g (dilation positive)\n", row->axial_strain,
+           row->volumetric_strain);
   printf("  energy      residual %.2g of the total work; friction %.4g J, damping %.4g J\n", row->energy_residual,
          row->dissipated_friction, row->dissipated_damping);
   printf("  accuracy    dt/dt_crit %.3g", row->dt_ratio);
-  if (isfinite(row->phi)) printf(", phi %.3g, psi %.3g", row->phi, row->psi);
+  if (isfinite(row->phi))
+    printf(", phi %.3g, psi %.3g", row->phi, row->psi);
   printf("\n");
 }
 
@@ -43,14 +46,16 @@ static int finish(tal_status status, const tal_run_result *result, const tal_cli
       printf("%s: the run is complete, nothing to resume\n", dir);
       return TAL_OK;
     }
-    if (!options->quiet) print_summary(result, dir);
+    if (!options->quiet)
+      print_summary(result, dir);
     return options->figures ? draw_figures(dir) : TAL_OK;
   case TAL_INTERRUPTED:
     fprintf(stderr, "talus: interrupted; go on with: talus run %s -o %s --resume\n", options->argument, dir);
     return status;
   case TAL_INVALID:
     fprintf(stderr, "talus: %s", err->text);
-    if (result->checkpoint) fprintf(stderr, "; last good checkpoint: %s/checkpoint.h5", dir);
+    if (result->checkpoint)
+      fprintf(stderr, "; last good checkpoint: %s/checkpoint.h5", dir);
     fprintf(stderr, "\n");
     return status;
   case TAL_BAD_INPUT: // the sentence names file, line and key itself
@@ -66,7 +71,8 @@ int tal_cli_run(int argc, char **argv) {
   int exit_code;
   const unsigned accepted =
       TAL_CLI_OUT | TAL_CLI_THREADS | TAL_CLI_SET | TAL_CLI_RESUME | TAL_CLI_QUIET | TAL_CLI_FIGURES;
-  if (!tal_cli_options_parse(&options, "run", accepted, "SCENE.yaml", argc, argv, &exit_code)) return exit_code;
+  if (!tal_cli_options_parse(&options, "run", accepted, "SCENE.yaml", argc, argv, &exit_code))
+    return exit_code;
   tal_scene scene;
   tal_scene_errors errors;
   if (tal_scene_load(&scene, options.argument, options.sets, options.set_count, &errors)) {

@@ -2,7 +2,9 @@
 
 #include <stdlib.h>
 
-void tal_contacts_init(tal_contacts *contacts) { *contacts = (tal_contacts){0}; }
+void tal_contacts_init(tal_contacts *contacts) {
+  *contacts = (tal_contacts){0};
+}
 
 void tal_contacts_clear(tal_contacts *contacts) {
 #define X(type, name, unit, kept, meaning) free(contacts->name);
@@ -12,7 +14,8 @@ void tal_contacts_clear(tal_contacts *contacts) {
 }
 
 void tal_contacts_reserve(tal_contacts *contacts, size_t capacity) {
-  if (capacity <= contacts->capacity) return;
+  if (capacity <= contacts->capacity)
+    return;
 #define X(type, name, unit, kept, meaning)                                                                             \
   contacts->name = tal_grow(contacts->name, contacts->capacity, capacity, sizeof(type));
   TAL_CONTACT_FIELDS(X)

@@ -1,6 +1,6 @@
-// Contact slots: one per candidate pair (grain-grain) or per candidate grain-wall meeting. A slot touches when overlap > 0.
-// Force on grain i: (fe + fd) n + ft t with n = (nx, ny) the unit normal INTO i (from j, or from the wall) and
-// t = (-ny, nx). Grain j gets the opposite. The contact point lies at x_i - (r_i - overlap/2) n (wall: r_i - overlap).
+// Contact slots: one per candidate pair (grain-grain) or per candidate grain-wall meeting. A slot touches when overlap
+// > 0. Force on grain i: (fe + fd) n + ft t with n = (nx, ny) the unit normal INTO i (from j, or from the wall) and t =
+// (-ny, nx). Grain j gets the opposite. The contact point lies at x_i - (r_i - overlap/2) n (wall: r_i - overlap).
 #ifndef TAL_CONTACTS_H
 #define TAL_CONTACTS_H
 

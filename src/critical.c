@@ -9,7 +9,8 @@
 // (lambda/4) dt^2 + gamma dt = 1 with lambda = k/m and gamma = c/m: where the amplification of verlet with predicted
 // velocities reaches -1.
 static double limit(double lambda, double gamma) {
-  if (lambda <= 0) return gamma > 0 ? 1 / gamma : (double)INFINITY;
+  if (lambda <= 0)
+    return gamma > 0 ? 1 / gamma : (double)INFINITY;
   double half = 2 * gamma / lambda;
   return 4 / lambda / (half + sqrt(half * half + 4 / lambda));
 }
@@ -33,12 +34,14 @@ static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, dou
 
 static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, double (*sum)[2]) {
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0) continue;
+    if (s->overlap[c] <= 0)
+      continue;
     double k, d;
     slot_slopes(sim, s, c, &k, &d);
     sum[s->i[c]][0] += k;
     sum[s->i[c]][1] += d;
-    if (!pairs) continue;
+    if (!pairs)
+      continue;
     sum[s->j[c]][0] += k;
     sum[s->j[c]][1] += d;
   }
@@ -52,14 +55,16 @@ double tal_critical_step(const tal_sim *sim) {
   double least = (double)INFINITY;
   const tal_contacts *s = &sim->pairs;
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0) continue;
+    if (s->overlap[c] <= 0)
+      continue;
     int32_t i = s->i[c], j = s->j[c];
     least = fmin(least, limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
                               sum[i][1] * g->inverse_mass[i] + sum[j][1] * g->inverse_mass[j]));
   }
   s = &sim->wall_contacts;
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0) continue;
+    if (s->overlap[c] <= 0)
+      continue;
     int32_t i = s->i[c];
     least = fmin(least, limit(sum[i][0] * g->inverse_mass[i], sum[i][1] * g->inverse_mass[i]));
   }
@@ -80,13 +85,15 @@ double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
   *grain = -1;
   for (size_t c = 0; c < s->count; c++) {
     double share = s->overlap[c] / fmin(g->r[s->i[c]], g->r[s->j[c]]);
-    if (share > largest) *grain = g->id[s->i[c]];
+    if (share > largest)
+      *grain = g->id[s->i[c]];
     largest = fmax(largest, share);
   }
   s = &sim->wall_contacts;
   for (size_t c = 0; c < s->count; c++) {
     double share = s->overlap[c] / g->r[s->i[c]];
-    if (share > largest) *grain = g->id[s->i[c]];
+    if (share > largest)
+      *grain = g->id[s->i[c]];
     largest = fmax(largest, share);
   }
   return largest;
@@ -103,14 +110,16 @@ static double confined_slope(const tal_scene *scene, const tal_constants *k, dou
 double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, double reduced_mass) {
   if (strcmp(scene->contact.normal, "linear") == 0) {
     double stiffness = scene->contact.stiffness, damping = 0;
-    if (!isnan(scene->contact.damping)) damping = scene->contact.damping;
+    if (!isnan(scene->contact.damping))
+      damping = scene->contact.damping;
     if (!isnan(scene->contact.restitution))
       damping = 2 * tal_linear_damping_ratio(scene->contact.restitution) * sqrt(stiffness * reduced_mass);
     return tal_critical_step_pair(stiffness, damping, reduced_mass);
   }
   double least = (double)INFINITY;
   for (size_t s = 0; s < scene->stage_count; s++) {
-    if (!(scene->stages[s].pressure > 0)) continue;
+    if (!(scene->stages[s].pressure > 0))
+      continue;
     double damping, slope = confined_slope(scene, k, scene->stages[s].pressure, &damping);
     least = fmin(least, tal_critical_step_pair(slope, damping, k->mean_mass / 2));
   }
@@ -120,7 +129,8 @@ double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, d
 double tal_friction_step(const tal_sim *sim, double pressure) {
   const tal_constants *k = &sim->constants;
   double cap = sim->scene->material.friction * pressure * 2 * k->mean_radius * k->thickness;
-  if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0)) return (double)INFINITY;
+  if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0))
+    return (double)INFINITY;
   // two free disks: the slip answers a tangential force with 2 (1/m + R^2/I) = 6/m
   return k->vR * k->mean_mass / (6 * cap);
 }

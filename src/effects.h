@@ -4,15 +4,15 @@
 #define TAL_EFFECTS_H
 
 enum tal_effect {
-  TAL_EFFECT_HERTZ = 1,        // normal force K d^1.5, else k d
-  TAL_EFFECT_DAMPING = 2,      // viscous part of the normal force
-  TAL_EFFECT_REGULARISED = 4,  // friction, viscous regularisation of Coulomb's law
-  TAL_EFFECT_SPRING = 8,       // friction, incremental spring with Coulomb cap
-  TAL_EFFECT_SPIN = 16,        // grains turn
-  TAL_EFFECT_GRAVITY = 32,     // body force
-  TAL_EFFECT_BOUNDARY = 64,    // forces of a boundary on grains (pressure)
-  TAL_EFFECT_WALLS = 128,      // walls and plates
-  TAL_EFFECT_HELD = 256        // fixed grains or held spins whose holders do work
+  TAL_EFFECT_HERTZ = 1,       // normal force K d^1.5, else k d
+  TAL_EFFECT_DAMPING = 2,     // viscous part of the normal force
+  TAL_EFFECT_REGULARISED = 4, // friction, viscous regularisation of Coulomb's law
+  TAL_EFFECT_SPRING = 8,      // friction, incremental spring with Coulomb cap
+  TAL_EFFECT_SPIN = 16,       // grains turn
+  TAL_EFFECT_GRAVITY = 32,    // body force
+  TAL_EFFECT_BOUNDARY = 64,   // forces of a boundary on grains (pressure)
+  TAL_EFFECT_WALLS = 128,     // walls and plates
+  TAL_EFFECT_HELD = 256       // fixed grains or held spins whose holders do work
 };
 
 #define TAL_EFFECT_FRICTION (TAL_EFFECT_REGULARISED | TAL_EFFECT_SPRING)

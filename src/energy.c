@@ -14,14 +14,17 @@ double tal_energy_kinetic(const tal_grains *g) {
 
 double tal_energy_gravity(const tal_grains *g, const double gravity[2]) {
   double sum = 0;
-  if (gravity[0] == 0 && gravity[1] == 0) return 0;
+  if (gravity[0] == 0 && gravity[1] == 0)
+    return 0;
   for (size_t i = 0; i < g->count; i++)
-    if (g->inverse_mass[i] > 0) sum -= g->mass[i] * (gravity[0] * g->x[i] + gravity[1] * g->y[i]);
+    if (g->inverse_mass[i] > 0)
+      sum -= g->mass[i] * (gravity[0] * g->x[i] + gravity[1] * g->y[i]);
   return sum;
 }
 
 static double normal_energy(const tal_sim *sim, const tal_contacts *s, size_t c) {
-  if (s->overlap[c] <= 0) return 0;
+  if (s->overlap[c] <= 0)
+    return 0;
   return sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_energy(s->stiffness[c], s->overlap[c])
                                          : tal_linear_energy(s->stiffness[c], s->overlap[c]);
 }
@@ -30,20 +33,27 @@ static double spring_energy(const tal_contacts *s, size_t c) {
   return s->spring_stiffness[c] > 0 ? 0.5 * s->spring[c] * s->spring[c] / s->spring_stiffness[c] : 0;
 }
 
-double tal_energy_wall_slot(const tal_sim *sim, size_t c) { return normal_energy(sim, &sim->wall_contacts, c); }
+double tal_energy_wall_slot(const tal_sim *sim, size_t c) {
+  return normal_energy(sim, &sim->wall_contacts, c);
+}
 
 double tal_energy_springs(const tal_sim *sim) {
   double sum = 0;
-  if (!(sim->effects & TAL_EFFECT_SPRING)) return 0;
-  for (size_t c = 0; c < sim->pairs.count; c++) sum += spring_energy(&sim->pairs, c);
-  for (size_t c = 0; c < sim->wall_contacts.count; c++) sum += spring_energy(&sim->wall_contacts, c);
+  if (!(sim->effects & TAL_EFFECT_SPRING))
+    return 0;
+  for (size_t c = 0; c < sim->pairs.count; c++)
+    sum += spring_energy(&sim->pairs, c);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++)
+    sum += spring_energy(&sim->wall_contacts, c);
   return sum;
 }
 
 double tal_energy_elastic(const tal_sim *sim) {
   double sum = 0;
-  for (size_t c = 0; c < sim->pairs.count; c++) sum += normal_energy(sim, &sim->pairs, c);
-  for (size_t c = 0; c < sim->wall_contacts.count; c++) sum += normal_energy(sim, &sim->wall_contacts, c);
+  for (size_t c = 0; c < sim->pairs.count; c++)
+    sum += normal_energy(sim, &sim->pairs, c);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++)
+    sum += normal_energy(sim, &sim->wall_contacts, c);
   return sum + tal_energy_springs(sim);
 }
 
@@ -57,12 +67,14 @@ static power grain_power(const tal_sim *sim, size_t i) {
   tal_resultant f = tal_forces_gather(sim, i);
   power p = {f.friction_x * g->vx[i] + f.friction_y * g->vy[i] + f.torque * g->omega[i],
              f.viscous_x * g->vx[i] + f.viscous_y * g->vy[i], 0, 0};
-  if (sim->effects & TAL_EFFECT_BOUNDARY) p.boundary = g->bx[i] * g->vx[i] + g->by[i] * g->vy[i];
+  if (sim->effects & TAL_EFFECT_BOUNDARY)
+    p.boundary = g->bx[i] * g->vx[i] + g->by[i] * g->vy[i];
   if (sim->effects & TAL_EFFECT_HELD) {
     const double *gravity = sim->scene->gravity;
     if (g->inverse_mass[i] == 0)
       p.held -= (g->rx[i] + g->mass[i] * gravity[0]) * g->vx[i] + (g->ry[i] + g->mass[i] * gravity[1]) * g->vy[i];
-    if (g->inverse_inertia[i] == 0) p.held -= f.torque * g->omega[i];
+    if (g->inverse_inertia[i] == 0)
+      p.held -= f.torque * g->omega[i];
   }
   return p;
 }
@@ -109,7 +121,8 @@ void tal_energy_row(const tal_sim *sim, tal_row *row) {
   row->work_held = work.held;
   row->dissipated_friction = wall_friction - work.friction - tal_energy_springs(sim);
   row->dissipated_damping = wall_damping - work.damping;
-  double change = row->kinetic - sim->run.kinetic0 + row->elastic - sim->run.elastic0 + row->gravity - sim->run.gravity0;
+  double change =
+      row->kinetic - sim->run.kinetic0 + row->elastic - sim->run.elastic0 + row->gravity - sim->run.gravity0;
   double input = wall + work.boundary + work.held;
   double missing = change + row->dissipated_friction + row->dissipated_damping - input;
   // The scale: everything that changed hands, and what was there to begin with.

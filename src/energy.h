@@ -5,15 +5,15 @@
 
 #include "sim.h"
 
-double tal_energy_kinetic(const tal_grains *grains);                                 // [J]
-double tal_energy_gravity(const tal_grains *grains, const double gravity[2]);        // [J]
-double tal_energy_elastic(const tal_sim *sim);                                       // [J] springs included
-double tal_energy_springs(const tal_sim *sim);                                       // [J] tangential springs alone
+double tal_energy_kinetic(const tal_grains *grains);                          // [J]
+double tal_energy_gravity(const tal_grains *grains, const double gravity[2]); // [J]
+double tal_energy_elastic(const tal_sim *sim);                                // [J] springs included
+double tal_energy_springs(const tal_sim *sim);                                // [J] tangential springs alone
 // Elastic energy of one grain-wall slot's normal force [J].
 double tal_energy_wall_slot(const tal_sim *sim, size_t c);
 
-// Credits the grains' accounts with `weight` [s] times the power of the forces of this (observed) instant. A run credits
-// dt per step; the first and last instants of a stage count half.
+// Credits the grains' accounts with `weight` [s] times the power of the forces of this (observed) instant. A run
+// credits dt per step; the first and last instants of a stage count half.
 void tal_energy_credit(tal_sim *sim, double weight);
 // Fills the ledger columns of a row from an observed instant.
 void tal_energy_row(const tal_sim *sim, tal_row *row);

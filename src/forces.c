@@ -1,6 +1,6 @@
 // The hot loop. Slots are taken in blocks: a scalar loop fetches the records of the two grains, a vector loop works out
-// geometry and law for the whole block (law.h), a last loop packs the forces into one record per contact. Then each grain
-// sums its records in the order of its partners. Measured by tests/bench/bench_step.c.
+// geometry and law for the whole block (law.h), a last loop packs the forces into one record per contact. Then each
+// grain sums its records in the order of its partners. Measured by tests/bench/bench_step.c.
 #include "forces.h"
 
 #include "effects.h"
@@ -11,13 +11,13 @@ enum { BLOCK = 128, CHUNK = 256 };
 
 // What a block of contacts brings, and what the law makes of it; one array per quantity.
 typedef struct block {
-  double dx[BLOCK], dy[BLOCK];   // centre i - centre j
-  double ux[BLOCK], uy[BLOCK];   // velocity i - velocity j
-  double hx[BLOCK], hy[BLOCK];   // the same in the middle of the step
-  double reach[BLOCK];           // sum of the radii
-  double spins[BLOCK];           // sum of the spins
-  double speeds[BLOCK];          // sum of radius times spin
-  double force[8][BLOCK];        // members of tal_force_record
+  double dx[BLOCK], dy[BLOCK]; // centre i - centre j
+  double ux[BLOCK], uy[BLOCK]; // velocity i - velocity j
+  double hx[BLOCK], hy[BLOCK]; // the same in the middle of the step
+  double reach[BLOCK];         // sum of the radii
+  double spins[BLOCK];         // sum of the spins
+  double speeds[BLOCK];        // sum of radius times spin
+  double force[8][BLOCK];      // members of tal_force_record
 } block;
 
 TAL_KERNEL void fetch(block *b, const tal_sim *sim, size_t start, int count, unsigned effects) {
@@ -48,7 +48,8 @@ TAL_KERNEL void fetch(block *b, const tal_sim *sim, size_t start, int count, uns
 TAL_KERNEL double slip_speed(double nx, double ny, double ux, double uy, double half_overlap, double speeds,
                              double spins, unsigned effects) {
   double slip = nx * uy - ny * ux;
-  if (effects & TAL_EFFECT_SPIN) slip -= speeds - half_overlap * spins;
+  if (effects & TAL_EFFECT_SPIN)
+    slip -= speeds - half_overlap * spins;
   return slip;
 }
 
@@ -138,7 +139,7 @@ static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, 
   switch (sim->effects & TAL_EFFECT_LAW) {
 #define X(mask)                                                                                                        \
   case (mask):                                                                                                         \
-    sweep_block(sim, dt, constants, start, (mask));                                                                     \
+    sweep_block(sim, dt, constants, start, (mask));                                                                    \
     break;
     VARIANTS(X)
 #undef X
@@ -183,8 +184,10 @@ void tal_forces_sweep(tal_sim *sim, double dt) {
                                  .tangential_ratio = sim->constants.tangential_ratio};
   const size_t blocks = (sim->pairs.count + BLOCK - 1) / BLOCK;
 #pragma omp parallel for schedule(static) if (blocks > 8)
-  for (size_t k = 0; k < blocks; k++) sweep_variant(sim, dt, constants, k * BLOCK);
-  for (size_t c = 0; c < sim->wall_contacts.count; c++) wall_slot(sim, dt, constants, c);
+  for (size_t k = 0; k < blocks; k++)
+    sweep_variant(sim, dt, constants, k * BLOCK);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++)
+    wall_slot(sim, dt, constants, c);
 }
 
 // Geometry and forces of one grain-grain slot, from the centres and the force record.
@@ -208,7 +211,8 @@ static void expand_pair(tal_sim *sim, size_t c) {
 
 void tal_forces_expand(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  for (size_t c = 0; c < sim->pairs.count; c++) expand_pair(sim, c);
+  for (size_t c = 0; c < sim->pairs.count; c++)
+    expand_pair(sim, c);
   tal_contacts *s = &sim->wall_contacts;
   for (size_t c = 0; c < s->count; c++) {
     int32_t i = s->i[c];
@@ -221,8 +225,8 @@ void tal_forces_expand(tal_sim *sim) {
 void tal_forces_see_now(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   for (size_t i = 0; i < g->count; i++)
-    sim->grain_records[i] = (tal_grain_record){g->x[i],  g->y[i],     g->r[i],  g->vx[i],
-                                               g->vy[i], g->omega[i], g->vx[i], g->vy[i]};
+    sim->grain_records[i] =
+        (tal_grain_record){g->x[i], g->y[i], g->r[i], g->vx[i], g->vy[i], g->omega[i], g->vx[i], g->vy[i]};
 }
 
 // ---- gather ---------------------------------------------------------------------------------------------------------
@@ -257,9 +261,11 @@ TAL_KERNEL tal_resultant gather(const tal_sim *sim, size_t grain, unsigned effec
   if (effects & TAL_EFFECT_FRICTION) {
     f.friction_x = sum[4];
     f.friction_y = sum[5];
-    if (effects & TAL_EFFECT_SPIN) f.torque = sum[7] - sim->grains.r[grain] * sum[6];
+    if (effects & TAL_EFFECT_SPIN)
+      f.torque = sum[7] - sim->grains.r[grain] * sum[6];
   }
-  if (effects & TAL_EFFECT_WALLS) gather_walls(sim, grain, &f);
+  if (effects & TAL_EFFECT_WALLS)
+    gather_walls(sim, grain, &f);
   return f;
 }
 
@@ -281,8 +287,8 @@ void tal_forces_resultants(tal_sim *sim) {
   }
 }
 
-// One grain: force, second half kick, and the work of this step's forces: dt f . v is the exact discrete work of a force
-// that acts over the two half kicks around the instant of v [eq (16)].
+// One grain: force, second half kick, and the work of this step's forces: dt f . v is the exact discrete work of a
+// force that acts over the two half kicks around the instant of v [eq (16)].
 TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects) {
   tal_grains *g = &sim->grains;
   tal_resultant f = gather(sim, i, effects);
@@ -306,11 +312,15 @@ TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects
     g->torque[i] = f.torque;
     g->omega[i] = omega;
     friction_power += f.torque * omega;
-    if (effects & TAL_EFFECT_HELD) held_power -= g->inverse_inertia[i] == 0 ? f.torque * omega : 0;
+    if (effects & TAL_EFFECT_HELD)
+      held_power -= g->inverse_inertia[i] == 0 ? f.torque * omega : 0;
   }
-  if (effects & TAL_EFFECT_FRICTION) g->friction_work[i] += dt * friction_power;
-  if (effects & TAL_EFFECT_DAMPING) g->damping_work[i] += dt * (f.viscous_x * vx + f.viscous_y * vy);
-  if (effects & TAL_EFFECT_BOUNDARY) g->boundary_work[i] += dt * (g->bx[i] * vx + g->by[i] * vy);
+  if (effects & TAL_EFFECT_FRICTION)
+    g->friction_work[i] += dt * friction_power;
+  if (effects & TAL_EFFECT_DAMPING)
+    g->damping_work[i] += dt * (f.viscous_x * vx + f.viscous_y * vy);
+  if (effects & TAL_EFFECT_BOUNDARY)
+    g->boundary_work[i] += dt * (g->bx[i] * vx + g->by[i] * vy);
   if (effects & TAL_EFFECT_HELD) {
     held_power -= g->inverse_mass[i] == 0 ? fx * vx + fy * vy : 0;
     g->held_work[i] += dt * held_power;
@@ -318,7 +328,8 @@ TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects
 }
 
 TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, unsigned effects) {
-  for (size_t i = start; i < end; i++) finish_grain(sim, i, dt, effects);
+  for (size_t i = start; i < end; i++)
+    finish_grain(sim, i, dt, effects);
 }
 
 // A biaxial test with either friction or none; the rest by the run-time mask.

@@ -5,8 +5,8 @@
 
 #include "sim.h"
 
-// Forces of every slot from the grain records: force records of the grain-grain slots, nx ... ft of the wall slots. dt [s]
-// moves the tangential springs; 0: an observation, histories are left alone.
+// Forces of every slot from the grain records: force records of the grain-grain slots, nx ... ft of the wall slots. dt
+// [s] moves the tangential springs; 0: an observation, histories are left alone.
 void tal_forces_sweep(tal_sim *sim, double dt);
 // Grain records of this very instant: centres and velocities as they stand.
 void tal_forces_see_now(tal_sim *sim);

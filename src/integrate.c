@@ -6,7 +6,8 @@ static const tal_integrator *const integrators[] = {&tal_verlet, NULL};
 
 const tal_integrator *tal_integrator_find(const char *name) {
   for (const tal_integrator *const *k = integrators; *k; k++)
-    if (!strcmp((*k)->name, name)) return *k;
+    if (!strcmp((*k)->name, name))
+      return *k;
   return NULL;
 }
 

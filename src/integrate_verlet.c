@@ -42,12 +42,16 @@ static void drift_all(tal_sim *sim) {
 
 static void advance(tal_sim *sim) {
   drift_all(sim);
-  if (sim->effects & TAL_EFFECT_WALLS) tal_walls_drift(sim);
-  if (tal_neighbours_stale(sim)) tal_neighbours_rebuild(sim);
-  if (sim->boundary) sim->boundary->apply(sim);
+  if (sim->effects & TAL_EFFECT_WALLS)
+    tal_walls_drift(sim);
+  if (tal_neighbours_stale(sim))
+    tal_neighbours_rebuild(sim);
+  if (sim->boundary)
+    sim->boundary->apply(sim);
   tal_forces_sweep(sim, sim->dt);
   tal_forces_finish_step(sim, sim->dt);
-  if (sim->effects & TAL_EFFECT_WALLS) tal_walls_take_loads(sim, sim->dt);
+  if (sim->effects & TAL_EFFECT_WALLS)
+    tal_walls_take_loads(sim, sim->dt);
 }
 
 const tal_integrator tal_verlet = {"verlet", "velocity Verlet, second order, velocities synchronised for the laws",

@@ -14,17 +14,27 @@ static const struct tal_law *const tangential_laws[] = {&none, &regularised, &sp
 
 static const struct tal_law *find(const struct tal_law *const *laws, const char *name) {
   for (; *laws; laws++)
-    if (!strcmp((*laws)->name, name)) return *laws;
+    if (!strcmp((*laws)->name, name))
+      return *laws;
   return NULL;
 }
 
 static size_t choices(const struct tal_law *const *laws, tal_choice *out, size_t capacity) {
   size_t count = 0;
-  for (; laws[count] && count < capacity; count++) out[count] = (tal_choice){laws[count]->name, laws[count]->help};
+  for (; laws[count] && count < capacity; count++)
+    out[count] = (tal_choice){laws[count]->name, laws[count]->help};
   return count;
 }
 
-const struct tal_law *tal_normal_law_find(const char *name) { return find(normal_laws, name); }
-const struct tal_law *tal_tangential_law_find(const char *name) { return find(tangential_laws, name); }
-size_t tal_normal_law_choices(tal_choice *out, size_t capacity) { return choices(normal_laws, out, capacity); }
-size_t tal_tangential_law_choices(tal_choice *out, size_t capacity) { return choices(tangential_laws, out, capacity); }
+const struct tal_law *tal_normal_law_find(const char *name) {
+  return find(normal_laws, name);
+}
+const struct tal_law *tal_tangential_law_find(const char *name) {
+  return find(tangential_laws, name);
+}
+size_t tal_normal_law_choices(tal_choice *out, size_t capacity) {
+  return choices(normal_laws, out, capacity);
+}
+size_t tal_tangential_law_choices(tal_choice *out, size_t capacity) {
+  return choices(tangential_laws, out, capacity);
+}

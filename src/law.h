@@ -11,13 +11,13 @@
 
 // What a law sees of one contact. Approach and slip are speeds of i against j [m/s].
 typedef struct tal_meeting {
-  double overlap;          // [m] touching when positive
-  double approach;         // [m/s] growth rate of the overlap
-  double slip;             // [m/s] along t
-  double slip_distance;    // [m] along t over this step (spring law)
-  double stiffness;        // slot's
-  double damping;          // slot's
-  double friction;         // slot's
+  double overlap;                  // [m] touching when positive
+  double approach;                 // [m/s] growth rate of the overlap
+  double slip;                     // [m/s] along t
+  double slip_distance;            // [m] along t over this step (spring law)
+  double stiffness;                // slot's
+  double damping;                  // slot's
+  double friction;                 // slot's
   double spring, spring_stiffness; // slot's history
 } tal_meeting;
 

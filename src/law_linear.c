@@ -6,9 +6,12 @@
 #include <math.h>
 
 double tal_linear_restitution(double zeta) {
-  if (zeta <= 0) return 1;
-  if (fabs(zeta - 1) < 1e-8) return exp(-2 + 4.0 / 3 * (1 - zeta)); // series about zeta = 1
-  if (zeta < 1) return exp(-2 * zeta * acos(zeta) / sqrt((1 - zeta) * (1 + zeta)));
+  if (zeta <= 0)
+    return 1;
+  if (fabs(zeta - 1) < 1e-8)
+    return exp(-2 + 4.0 / 3 * (1 - zeta)); // series about zeta = 1
+  if (zeta < 1)
+    return exp(-2 * zeta * acos(zeta) / sqrt((1 - zeta) * (1 + zeta)));
   return exp(-2 * zeta * acosh(zeta) / sqrt((zeta - 1) * (zeta + 1)));
 }
 
@@ -18,7 +21,8 @@ static double excess(double log_zeta, void *log_restitution) {
 
 double tal_linear_damping_ratio(double restitution) {
   assert(restitution > 0 && restitution <= 1);
-  if (restitution == 1) return 0;
+  if (restitution == 1)
+    return 0;
   double target = log(restitution);
   gsl_function f = {excess, &target};
   gsl_root_fsolver *solver = gsl_root_fsolver_alloc(gsl_root_fsolver_brent);

@@ -10,8 +10,14 @@ double tal_linear_restitution(double damping_ratio);
 // The damping ratio that delivers the speed ratio e in (0, 1]; inverse of the above by GSL's root finder.
 double tal_linear_damping_ratio(double restitution);
 
-TAL_KERNEL double tal_linear_elastic(double stiffness, double overlap) { return stiffness * overlap; }
-TAL_KERNEL double tal_linear_viscous(double damping, double approach) { return damping * approach; }
-TAL_KERNEL double tal_linear_energy(double stiffness, double overlap) { return 0.5 * stiffness * overlap * overlap; }
+TAL_KERNEL double tal_linear_elastic(double stiffness, double overlap) {
+  return stiffness * overlap;
+}
+TAL_KERNEL double tal_linear_viscous(double damping, double approach) {
+  return damping * approach;
+}
+TAL_KERNEL double tal_linear_energy(double stiffness, double overlap) {
+  return 0.5 * stiffness * overlap * overlap;
+}
 
 #endif

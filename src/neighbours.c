@@ -9,7 +9,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-void tal_neighbours_init(tal_neighbours *neighbours) { *neighbours = (tal_neighbours){0}; }
+void tal_neighbours_init(tal_neighbours *neighbours) {
+  *neighbours = (tal_neighbours){0};
+}
 
 void tal_neighbours_clear(tal_neighbours *neighbours) {
   geo_pairs_clear(&neighbours->pairs);
@@ -27,8 +29,10 @@ static double reduced_mass(double inverse_i, double inverse_j) {
 
 static double slot_damping(const tal_sim *sim, double stiffness, double mass) {
   const tal_scene_contact *law = &sim->scene->contact;
-  if (sim->effects & TAL_EFFECT_HERTZ) return sim->scene->material.damping * stiffness;
-  if (isnan(law->restitution)) return isnan(law->damping) ? 0 : law->damping;
+  if (sim->effects & TAL_EFFECT_HERTZ)
+    return sim->scene->material.damping * stiffness;
+  if (isnan(law->restitution))
+    return isnan(law->damping) ? 0 : law->damping;
   return 2 * tal_linear_damping_ratio(law->restitution) * sqrt(stiffness * mass);
 }
 
@@ -38,10 +42,9 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   double modulus = sim->constants.modulus;
   slots->i[c] = i;
   slots->j[c] = j;
-  slots->stiffness[c] = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced)
-                                                        : sim->scene->contact.stiffness;
-  slots->damping[c] =
-      slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
+  slots->stiffness[c] =
+      sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
+  slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
   slots->friction[c] = sim->friction;
   slots->spring[c] = slots->spring_stiffness[c] = 0;
 }
@@ -63,7 +66,8 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
 static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
   size_t o = 0;
   for (size_t c = 0; c < slots->count; c++) {
-    while (o < old->count && (old->i[o] < slots->i[c] || (old->i[o] == slots->i[c] && old->j[o] < slots->j[c]))) o++;
+    while (o < old->count && (old->i[o] < slots->i[c] || (old->i[o] == slots->i[c] && old->j[o] < slots->j[c])))
+      o++;
     if (o < old->count && old->i[o] == slots->i[c] && old->j[o] == slots->j[c]) {
       slots->spring[c] = old->spring[o];
       slots->spring_stiffness[c] = old->spring_stiffness[o];
@@ -79,8 +83,10 @@ static void list_pairs(tal_sim *sim) {
   tal_contacts_init(&fresh);
   tal_contacts_reserve(&fresh, pairs->count + pairs->count / 16 + 64);
   fresh.count = pairs->count;
-  for (size_t c = 0; c < pairs->count; c++) fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
-  if (sim->effects & TAL_EFFECT_SPRING) carry_springs(&sim->pairs, &fresh);
+  for (size_t c = 0; c < pairs->count; c++)
+    fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
+  if (sim->effects & TAL_EFFECT_SPRING)
+    carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
   free(sim->force_records);
@@ -91,7 +97,8 @@ static void list_pairs(tal_sim *sim) {
 static void book_vanished(tal_sim *sim) {
   for (size_t c = 0; c < sim->wall_contacts.count; c++) {
     tal_wall *wall = &sim->walls.wall[sim->wall_contacts.j[c]];
-    if (!tal_wall_active(wall, sim->run.time)) wall->work -= tal_energy_wall_slot(sim, c);
+    if (!tal_wall_active(wall, sim->run.time))
+      wall->work -= tal_energy_wall_slot(sim, c);
   }
 }
 
@@ -104,14 +111,18 @@ static void list_walls(tal_sim *sim) {
     sim->neighbours.wall_first[i] = (int32_t)fresh.count;
     for (size_t w = 0; w < sim->walls.count; w++) {
       const tal_wall *wall = &sim->walls.wall[w];
-      if (!tal_wall_active(wall, sim->run.time)) continue;
-      if (tal_wall_nearest(wall, g->x[i], g->y[i]).distance >= g->r[i] + sim->constants.skin) continue;
-      if (fresh.count == fresh.capacity) tal_contacts_reserve(&fresh, fresh.capacity * 2 + 64);
+      if (!tal_wall_active(wall, sim->run.time))
+        continue;
+      if (tal_wall_nearest(wall, g->x[i], g->y[i]).distance >= g->r[i] + sim->constants.skin)
+        continue;
+      if (fresh.count == fresh.capacity)
+        tal_contacts_reserve(&fresh, fresh.capacity * 2 + 64);
       fill_wall(sim, &fresh, fresh.count++, (int32_t)i, (int32_t)w);
     }
   }
   sim->neighbours.wall_first[g->count] = (int32_t)fresh.count;
-  if (sim->effects & TAL_EFFECT_SPRING) carry_springs(&sim->wall_contacts, &fresh);
+  if (sim->effects & TAL_EFFECT_SPRING)
+    carry_springs(&sim->wall_contacts, &fresh);
   tal_contacts_swap(&sim->wall_contacts, &fresh);
   tal_contacts_clear(&fresh);
 }
@@ -131,7 +142,8 @@ static void list_incidences(tal_sim *sim) {
     n->first[slots->i[c] + 1]++;
     n->first[slots->j[c] + 1]++;
   }
-  for (size_t i = 0; i < count; i++) n->first[i + 1] += n->first[i];
+  for (size_t i = 0; i < count; i++)
+    n->first[i + 1] += n->first[i];
   for (size_t c = 0; c < slots->count; c++) {
     n->slot[n->first[slots->i[c]]++] = (int32_t)c;
     n->slot[n->first[slots->j[c]]++] = ~(int32_t)c;
@@ -186,7 +198,8 @@ bool tal_neighbours_stale(const tal_sim *sim) {
   for (size_t w = 0; w < sim->walls.count; w++) {
     const tal_wall *wall = &sim->walls.wall[w];
     other = fmax(other, hypot(wall->x0 - wall->x_list, wall->y0 - wall->y_list));
-    if (tal_wall_active(wall, sim->run.time) != (wall->listed != 0)) return true;
+    if (tal_wall_active(wall, sim->run.time) != (wall->listed != 0))
+      return true;
   }
   return !(grains + other < sim->constants.skin);
 }

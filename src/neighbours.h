@@ -8,10 +8,10 @@
 struct tal_sim;
 
 typedef struct tal_neighbours {
-  geo_pairs pairs;       // scratch of the bucket grid
-  int32_t *first;        // owned; [n + 1] start of each grain's incidences
-  int32_t *slot;         // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
-  int32_t *wall_first;   // owned; [n + 1] the same for wall contacts; only meaningful when there are any
+  geo_pairs pairs;     // scratch of the bucket grid
+  int32_t *first;      // owned; [n + 1] start of each grain's incidences
+  int32_t *slot;       // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
+  int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
   size_t grain_capacity, slot_capacity;
   uint64_t rebuilds;
 } tal_neighbours;

@@ -3,7 +3,8 @@
 #include <math.h>
 
 void tal_plates_ensure(tal_sim *sim) {
-  if (tal_walls_plate(&sim->walls, +1)) return;
+  if (tal_walls_plate(&sim->walls, +1))
+    return;
   const tal_grains *g = &sim->grains;
   double bottom = (double)INFINITY, top = -(double)INFINITY;
   for (size_t i = 0; i < g->count; i++) {

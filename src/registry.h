@@ -11,11 +11,11 @@ typedef struct tal_choice {
 } tal_choice;
 
 // Each writes the choices in registry order into out[capacity] and returns their number.
-size_t tal_normal_law_choices(tal_choice *out, size_t capacity);      // law.c
-size_t tal_tangential_law_choices(tal_choice *out, size_t capacity);  // law.c
-size_t tal_integrator_choices(tal_choice *out, size_t capacity);      // integrate.c
-size_t tal_boundary_choices(tal_choice *out, size_t capacity);        // boundary.c
-size_t tal_stage_choices(tal_choice *out, size_t capacity);           // stage.c
-size_t tal_packer_choices(tal_choice *out, size_t capacity);          // pack.c
+size_t tal_normal_law_choices(tal_choice *out, size_t capacity);     // law.c
+size_t tal_tangential_law_choices(tal_choice *out, size_t capacity); // law.c
+size_t tal_integrator_choices(tal_choice *out, size_t capacity);     // integrate.c
+size_t tal_boundary_choices(tal_choice *out, size_t capacity);       // boundary.c
+size_t tal_stage_choices(tal_choice *out, size_t capacity);          // stage.c
+size_t tal_packer_choices(tal_choice *out, size_t capacity);         // pack.c
 
 #endif

@@ -52,7 +52,8 @@ typedef struct job {
 // What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
 static size_t warnings(const job *this, char text[200], const char *out[1]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
-  if (!(this->sim->dt > friction)) return 0;
+  if (!(this->sim->dt > friction))
+    return 0;
   snprintf(text, 200,
            "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
            this->sim->dt, friction);
@@ -65,30 +66,32 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
   int64_t steps = this->sim->run.step - this->first_step;
   char text[200];
   const char *sentences[1];
-  tal_run_report report = {
-      .status = name,
-      .reason = reason,
-      .cores = this->cores,
-      .wall_time = this->wall_before + took,
-      .grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0,
-      .energy_residual = this->row.energy_residual,
-      .stages = this->stages,
-      .stage_count = this->scene->stage_count,
-      .warnings = sentences,
-      .warning_count = warnings(this, text, sentences)};
+  tal_run_report report = {.status = name,
+                           .reason = reason,
+                           .cores = this->cores,
+                           .wall_time = this->wall_before + took,
+                           .grain_steps_per_second =
+                               took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0,
+                           .energy_residual = this->row.energy_residual,
+                           .stages = this->stages,
+                           .stage_count = this->scene->stage_count,
+                           .warnings = sentences,
+                           .warning_count = warnings(this, text, sentences)};
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
 static tal_status write_checkpoint(job *this, tal_error *err) {
   tal_status status = tal_output_checkpoint(this->output, this->sim, err);
-  if (status) return status;
+  if (status)
+    return status;
   this->checkpoint = true;
   return report_run(this, "running", "", err);
 }
 
 // Whole number of steps nearest to `every`, at least 1; 0 for never.
 static int64_t cadence(double every, double dt) {
-  if (!isfinite(every)) return 0;
+  if (!isfinite(every))
+    return 0;
   double steps = round(every / dt);
   return steps < 1 ? 1 : (int64_t)steps;
 }
@@ -101,9 +104,12 @@ static bool due(const tal_sim *sim, double every) {
 static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
-  if ((status = tal_output_row(this->output, &this->row, err))) return status;
-  if (fields && (status = tal_output_fields(this->output, this->sim, err))) return status;
-  if (!this->scene->output.track_count) return TAL_OK;
+  if ((status = tal_output_row(this->output, &this->row, err)))
+    return status;
+  if (fields && (status = tal_output_fields(this->output, this->sim, err)))
+    return status;
+  if (!this->scene->output.track_count)
+    return TAL_OK;
   tal_sim_observe(this->sim); // last: it overwrites the driving forces in the slots
   return tal_output_tracks(this->output, this->sim, err);
 }
@@ -113,8 +119,10 @@ static tal_status observe(job *this, tal_error *err) {
   const tal_scene_output *plan = &this->scene->output;
   bool fields = due(this->sim, plan->fields_every);
   tal_status status = TAL_OK;
-  if (due(this->sim, plan->series_every) || fields) status = write_row(this, fields, err);
-  if (status) return status;
+  if (due(this->sim, plan->series_every) || fields)
+    status = write_row(this, fields, err);
+  if (status)
+    return status;
   int64_t steps = cadence(plan->checkpoint_every, this->sim->dt);
   if (tal_sim_done(this->sim) || (steps > 0 && this->sim->run.stage_step % steps == 0))
     status = write_checkpoint(this, err);
@@ -135,15 +143,18 @@ static void account_stage(job *this, int64_t stage) {
 
 static tal_status advance(job *this, tal_error *err) {
   while (!tal_sim_done(this->sim)) {
-    if (asked_to_stop) return TAL_INTERRUPTED;
+    if (asked_to_stop)
+      return TAL_INTERRUPTED;
     int64_t stage = this->sim->run.stage;
     tal_status status = tal_sim_step(this->sim, err);
     if (this->sim->run.stage != stage) { // the step belongs to the next stage
       this->stage_first_step = this->sim->run.step - 1;
       this->stage_started = clock_now();
     }
-    if (status || (status = observe(this, err))) return status;
-    if (this->sim->run.stage_done) account_stage(this, this->sim->run.stage);
+    if (status || (status = observe(this, err)))
+      return status;
+    if (this->sim->run.stage_done)
+      account_stage(this, this->sim->run.stage);
     tal_progress_show(&this->progress, this->sim);
   }
   return TAL_OK;
@@ -152,13 +163,16 @@ static tal_status advance(job *this, tal_error *err) {
 // Steps until done, then says in run.json how it ended.
 static tal_status run_job(job *this, tal_error *err) {
   tal_status status = advance(this, err), reported;
-  if (status != TAL_OK && this->scene->stage_count) account_stage(this, this->sim->run.stage);
+  if (status != TAL_OK && this->scene->stage_count)
+    account_stage(this, this->sim->run.stage);
   switch (status) {
   case TAL_OK:
     return report_run(this, "done", "", err);
   case TAL_INTERRUPTED:
-    if ((reported = write_checkpoint(this, err))) return reported;
-    if ((reported = report_run(this, "interrupted", "", err))) return reported;
+    if ((reported = write_checkpoint(this, err)))
+      return reported;
+    if ((reported = report_run(this, "interrupted", "", err)))
+      return reported;
     return status;
   case TAL_INVALID:
     report_run(this, "invalid", err ? err->text : "", NULL);
@@ -170,7 +184,8 @@ static tal_status run_job(job *this, tal_error *err) {
 
 static tal_status open_output(job *this, const tal_run_options *options, bool *finished, tal_error *err) {
   *finished = false;
-  if (options->resume) return tal_output_resume(&this->output, options->dir, this->scene, this->sim, finished, err);
+  if (options->resume)
+    return tal_output_resume(&this->output, options->dir, this->scene, this->sim, finished, err);
   return tal_output_create(&this->output, options->dir, this->scene, err);
 }
 
@@ -198,9 +213,11 @@ static void fill_result(const job *this, tal_run_result *result) {
 static tal_status run_opened(job *this, const tal_run_options *options, tal_run_result *result, tal_error *err) {
   tal_status status = TAL_OK;
   begin_accounts(this);
-  if (!options->resume && (status = write_row(this, true, err)) == TAL_OK) status = write_checkpoint(this, err);
+  if (!options->resume && (status = write_row(this, true, err)) == TAL_OK)
+    status = write_checkpoint(this, err);
   tal_progress_begin(&this->progress, this->sim, options->quiet);
-  if (status == TAL_OK) status = run_job(this, err);
+  if (status == TAL_OK)
+    status = run_job(this, err);
   tal_progress_end(&this->progress);
   fill_result(this, result);
   free(this->stages);
@@ -214,13 +231,16 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
   run.cores = options->threads > 0 ? options->threads : omp_get_num_procs();
   omp_set_num_threads(run.cores);
   tal_status status = tal_sim_create(&run.sim, scene, err);
-  if (status == TAL_OK) status = tal_output_check_tracks(scene, run.sim->grains.count, err);
-  if (status == TAL_OK) status = open_output(&run, options, &result->already_done, err);
+  if (status == TAL_OK)
+    status = tal_output_check_tracks(scene, run.sim->grains.count, err);
+  if (status == TAL_OK)
+    status = open_output(&run, options, &result->already_done, err);
   if (status == TAL_OK && !result->already_done) {
     catch_signals();
     status = run_opened(&run, options, result, err);
   }
-  if (run.output) tal_output_close(run.output);
+  if (run.output)
+    tal_output_close(run.output);
   tal_sim_free(run.sim);
   return status;
 }

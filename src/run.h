@@ -5,22 +5,22 @@
 #include "sim.h"
 
 typedef struct tal_run_options {
-  const char *dir;  // where the files go
-  int threads;      // 0: as many as there are
-  bool resume;      // go on from the checkpoint in dir
-  bool quiet;       // no progress line
+  const char *dir; // where the files go
+  int threads;     // 0: as many as there are
+  bool resume;     // go on from the checkpoint in dir
+  bool quiet;      // no progress line
 } tal_run_options;
 
 typedef struct tal_run_result {
-  tal_row row;                // of the last state
-  bool already_done;          // resume of a finished run
-  bool checkpoint;            // dir holds a good checkpoint of this run
-  double wall_time;           // [s] of this process
+  tal_row row;       // of the last state
+  bool already_done; // resume of a finished run
+  bool checkpoint;   // dir holds a good checkpoint of this run
+  double wall_time;  // [s] of this process
   double grain_steps_per_second;
 } tal_run_result;
 
-// Runs the scene into options->dir. Returns TAL_OK, TAL_BAD_INPUT, TAL_INVALID (the last good checkpoint stays), TAL_IO,
-// or TAL_INTERRUPTED after SIGINT, SIGTERM or SIGUSR1 (checkpoint written), with one sentence in err.
+// Runs the scene into options->dir. Returns TAL_OK, TAL_BAD_INPUT, TAL_INVALID (the last good checkpoint stays),
+// TAL_IO, or TAL_INTERRUPTED after SIGINT, SIGTERM or SIGUSR1 (checkpoint written), with one sentence in err.
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err);
 

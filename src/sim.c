@@ -12,16 +12,20 @@
 
 static double mean(const double *value, size_t count) {
   double sum = 0;
-  for (size_t k = 0; k < count; k++) sum += value[k];
+  for (size_t k = 0; k < count; k++)
+    sum += value[k];
   return sum / (double)count;
 }
 
-static double plane_modulus(double young, double poisson) { return young / (1 - poisson * poisson); }
+static double plane_modulus(double young, double poisson) {
+  return young / (1 - poisson * poisson);
+}
 
 // The rate that sets vR: of the first stage that has one, NAN without.
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0) return scene->stages[s].rate;
+    if (scene->stages[s].rate > 0)
+      return scene->stages[s].rate;
   return (double)NAN;
 }
 
@@ -57,10 +61,10 @@ static tal_status make_grains(tal_sim *sim, tal_error *err) {
   const tal_scene *scene = sim->scene;
   tal_packing packing;
   tal_status status = tal_pack(scene, &packing, err);
-  if (status) return status;
+  if (status)
+    return status;
   sim->constants.mean_radius = mean(packing.r, packing.count);
-  sim->constants.thickness =
-      isnan(scene->grains.thickness) ? 2 * sim->constants.mean_radius : scene->grains.thickness;
+  sim->constants.thickness = isnan(scene->grains.thickness) ? 2 * sim->constants.mean_radius : scene->grains.thickness;
   tal_packing_grains(&packing, scene, sim->constants.thickness, &sim->grains);
   sim->packing_solid_fraction = packing.solid_fraction;
   sim->packing_coordination = packing.coordination;
@@ -83,7 +87,8 @@ static double heaviest_reduced_mass(const tal_sim *sim) {
   double first = 0, second = 0;
   bool immovable = sim->walls.count > 0;
   for (size_t i = 0; i < g->count; i++) {
-    if (g->inverse_mass[i] == 0) immovable = true;
+    if (g->inverse_mass[i] == 0)
+      immovable = true;
     double mass = g->inverse_mass[i] == 0 ? 0 : g->mass[i];
     if (mass > first) {
       second = first;
@@ -101,11 +106,13 @@ static tal_status check_scene_step(const tal_sim *sim, tal_error *err) {
   double critical = tal_critical_step_scene(scene, &sim->constants, heaviest_reduced_mass(sim));
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_integrator *plan = &scene->stages[s].integrator;
-    if (plan->force || !(plan->dt > critical)) continue;
-    return tal_fail(err, TAL_BAD_INPUT,
-                    "%s:%d: integrator.dt: %g s is above the critical step of the contacts; accepted: at most %.4g s, or "
-                    "force: true at your own risk",
-                    scene->path, scene->line_dt, plan->dt, critical);
+    if (plan->force || !(plan->dt > critical))
+      continue;
+    return tal_fail(
+        err, TAL_BAD_INPUT,
+        "%s:%d: integrator.dt: %g s is above the critical step of the contacts; accepted: at most %.4g s, or "
+        "force: true at your own risk",
+        scene->path, scene->line_dt, plan->dt, critical);
   }
   return TAL_OK;
 }
@@ -121,7 +128,8 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   }
   set_constants(sim);
   set_graph(sim);
-  for (size_t w = 0; w < scene->wall_count; w++) add_wall(sim, &scene->walls[w]);
+  for (size_t w = 0; w < scene->wall_count; w++)
+    add_wall(sim, &scene->walls[w]);
   if ((status = check_scene_step(sim, err))) {
     tal_sim_free(sim);
     return status;
@@ -136,7 +144,8 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   sim->run.gravity0 = tal_energy_gravity(&sim->grains, scene->gravity);
   sim->run.rest = (double)INFINITY;
   status = tal_step_inspect(sim, err);
-  if (status == TAL_OK && scene->stage_count) status = tal_step_begin_stage(sim, err);
+  if (status == TAL_OK && scene->stage_count)
+    status = tal_step_begin_stage(sim, err);
   if (status) {
     tal_sim_free(sim);
     return status;
@@ -146,7 +155,8 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
 }
 
 void tal_sim_free(tal_sim *sim) {
-  if (!sim) return;
+  if (!sim)
+    return;
   tal_grains_clear(&sim->grains);
   tal_contacts_clear(&sim->pairs);
   tal_contacts_clear(&sim->wall_contacts);
@@ -160,18 +170,19 @@ void tal_sim_free(tal_sim *sim) {
 
 const tal_scene_stage *tal_sim_stage(const tal_sim *sim) {
   const tal_scene *scene = sim->scene;
-  if (!scene->stage_count) return NULL;
+  if (!scene->stage_count)
+    return NULL;
   size_t stage = (size_t)sim->run.stage < scene->stage_count ? (size_t)sim->run.stage : scene->stage_count - 1;
   return &scene->stages[stage];
 }
 
 bool tal_sim_done(const tal_sim *sim) {
-  return sim->scene->stage_count == 0 ||
-         (sim->run.stage_done && (size_t)sim->run.stage + 1 >= sim->scene->stage_count);
+  return sim->scene->stage_count == 0 || (sim->run.stage_done && (size_t)sim->run.stage + 1 >= sim->scene->stage_count);
 }
 
 tal_observed tal_sim_observe(tal_sim *sim) {
-  if (sim->boundary && sim->graph.valid) sim->boundary->apply(sim);
+  if (sim->boundary && sim->graph.valid)
+    sim->boundary->apply(sim);
   tal_forces_see_now(sim);
   tal_forces_sweep(sim, 0);
   return tal_sim_driving(sim);
@@ -192,12 +203,14 @@ tal_observed tal_sim_driving(tal_sim *sim) {
 
 // Where nothing keeps the graph fresh it is built for the row; failing (too few grains) leaves it invalid.
 static void fresh_graph(tal_sim *sim) {
-  if (!tal_step_keeps_graph(sim)) tal_graph_refresh(&sim->graph, &sim->grains, NULL);
+  if (!tal_step_keeps_graph(sim))
+    tal_graph_refresh(&sim->graph, &sim->grains, NULL);
 }
 
 static double volumetric_strain(const tal_sim *sim) {
   const tal_run *run = &sim->run;
-  if (!run->strain_begun) return 0;
+  if (!run->strain_begun)
+    return 0;
   double area = geo_loop_area(&sim->graph.loop, sim->grains.x, sim->grains.y);
   return exp(run->log_volume + log(area / run->refresh_area)) - 1;
 }
@@ -260,7 +273,8 @@ void tal_sim_restored(tal_sim *sim) {
   if (plan) {
     sim->dt = plan->integrator.dt;
     sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
-    if (plan->pressure > 0) sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");
+    if (plan->pressure > 0)
+      sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");
   }
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);

@@ -15,7 +15,7 @@
 #define TAL_RUN_FIELDS(X)                                                                                              \
   X(int64_t, step, "1", "small steps taken since the start")                                                           \
   X(double, time, "s", "simulated time")                                                                               \
-  X(int64_t, stage, "1", "index of the current stage; the number of stages when all are done")                        \
+  X(int64_t, stage, "1", "index of the current stage; the number of stages when all are done")                         \
   X(int64_t, stage_step, "1", "steps taken in this stage")                                                             \
   X(double, stage_start, "s", "time at which this stage began")                                                        \
   X(int64_t, bedding, "1", "1 while the plates bed the uneven ends of a packing")                                      \
@@ -105,21 +105,21 @@ typedef struct tal_stage tal_stage;
 
 // Constants derived once from scene and packing.
 typedef struct tal_constants {
-  double mean_radius;   // [m] of the grains
-  double mean_mass;     // [kg] scaling included
-  double thickness;     // [m]
-  double vR;            // [m/s] NAN when no law needs it and no stage gives it
-  double modulus;       // [Pa] young / (1 - poisson^2) of the grains
-  double skin;          // [m]
+  double mean_radius;      // [m] of the grains
+  double mean_mass;        // [kg] scaling included
+  double thickness;        // [m]
+  double vR;               // [m/s] NAN when no law needs it and no stage gives it
+  double modulus;          // [Pa] young / (1 - poisson^2) of the grains
+  double skin;             // [m]
   double tangential_ratio; // k_t / k_n of the spring law
 } tal_constants;
 
 struct tal_sim {
-  const tal_scene *scene;       // borrowed
+  const tal_scene *scene; // borrowed
   tal_constants constants;
   tal_grains grains;
-  tal_contacts pairs;           // grain-grain slots
-  tal_contacts wall_contacts;   // grain-wall slots
+  tal_contacts pairs;         // grain-grain slots
+  tal_contacts wall_contacts; // grain-wall slots
   tal_walls walls;
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
   tal_force_record *force_records; // owned; [pairs.capacity] what they answer
@@ -143,11 +143,11 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err);
 // True when every stage is finished.
 bool tal_sim_done(const tal_sim *sim);
 // The forces that drive the motion at this instant, as the last step left them in the slots: sums into rx, ry, rtorque.
-// What series and fields look at. Where explicit friction chatters these balance the boundary forces in the mean; forces
-// read again with the corrected velocities do not (method.md, chapter 4).
+// What series and fields look at. Where explicit friction chatters these balance the boundary forces in the mean;
+// forces read again with the corrected velocities do not (method.md, chapter 4).
 tal_observed tal_sim_driving(tal_sim *sim);
-// Forces of this instant read again with this instant's velocities, into slots and rx, ry, rtorque; changes nothing that
-// the motion sees. What tracks look at. Equal to the driving forces up to the order of the integrator.
+// Forces of this instant read again with this instant's velocities, into slots and rx, ry, rtorque; changes nothing
+// that the motion sees. What tracks look at. Equal to the driving forces up to the order of the integrator.
 tal_observed tal_sim_observe(tal_sim *sim);
 // The series line of this instant, from the driving forces.
 void tal_sim_row(tal_sim *sim, tal_row *row);

@@ -47,7 +47,8 @@ static void close_window(tal_sim *sim, const tal_macro *macro) {
   double sum = 0, window = sim->run.time - sim->run.impulse_time;
   size_t free_grains = 0;
   for (size_t i = 0; i < g->count; i++) {
-    if (g->inverse_mass[i] == 0) continue;
+    if (g->inverse_mass[i] == 0)
+      continue;
     sum += g->mass[i] * hypot(g->vx[i] - g->window_vx[i], g->vy[i] - g->window_vy[i]) / window;
     free_grains++;
   }
@@ -65,17 +66,21 @@ static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_erro
   if (run->bedding && elapsed >= plan->ramp) {
     run->bedding = 0;
     tal_status status = tal_step_refresh(sim, err); // the arcs end elsewhere now
-    if (status) return status;
+    if (status)
+      return status;
   }
-  if (run->time - run->impulse_time < window_share * plan->ramp * (1 - 1e-9)) return TAL_OK;
+  if (run->time - run->impulse_time < window_share * plan->ramp * (1 - 1e-9))
+    return TAL_OK;
   tal_observed seen = tal_sim_driving(sim);
   tal_macro macro;
   tal_macro_measure(&seen, &macro);
   close_window(sim, &macro);
-  if (run->bedding) return TAL_OK;
+  if (run->bedding)
+    return TAL_OK;
   run->stage_done = near(macro.stress.xx, plan->pressure, plan->tolerance) &&
                     near(macro.stress.yy, plan->pressure, plan->tolerance) && run->rest <= plan->unbalanced;
-  if (run->stage_done || elapsed < plan->timeout) return TAL_OK;
+  if (run->stage_done || elapsed < plan->timeout)
+    return TAL_OK;
   return tal_fail(err, TAL_INVALID,
                   "confine did not settle in %g s: sigma_xx = %.4g Pa, sigma_yy = %.4g Pa for a pressure of %.4g Pa "
                   "(tolerance %g), unbalanced %.3g (asked: %g); a longer timeout or ramp, more damping or a looser "

@@ -7,7 +7,9 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
   return TAL_OK;
 }
 
-static void before_step(tal_sim *sim, const tal_scene_stage *plan) { (void)sim, (void)plan; }
+static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
+  (void)sim, (void)plan;
+}
 
 static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   (void)err;

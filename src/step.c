@@ -19,41 +19,54 @@ enum { INSPECT_EVERY = 100 };
 
 static bool any_spin(const tal_grains *g) {
   for (size_t i = 0; i < g->count; i++)
-    if (g->omega[i] != 0) return true;
+    if (g->omega[i] != 0)
+      return true;
   return false;
 }
 
 static bool any_held_motion(const tal_grains *g) {
   for (size_t i = 0; i < g->count; i++) {
-    if (g->inverse_mass[i] == 0 && (g->vx[i] != 0 || g->vy[i] != 0)) return true;
-    if (g->inverse_inertia[i] == 0 && g->omega[i] != 0) return true;
+    if (g->inverse_mass[i] == 0 && (g->vx[i] != 0 || g->vy[i] != 0))
+      return true;
+    if (g->inverse_inertia[i] == 0 && g->omega[i] != 0)
+      return true;
   }
   return false;
 }
 
 static bool any_friction(const tal_sim *sim) {
-  if (sim->friction > 0) return true;
+  if (sim->friction > 0)
+    return true;
   for (size_t w = 0; w < sim->walls.count; w++)
-    if (sim->walls.wall[w].friction > 0) return true;
+    if (sim->walls.wall[w].friction > 0)
+      return true;
   return false;
 }
 
 static bool any_damping(const tal_sim *sim) {
   const tal_scene_contact *law = &sim->scene->contact;
-  if (tal_normal_law_find(law->normal)->effects & TAL_EFFECT_HERTZ) return sim->scene->material.damping > 0;
+  if (tal_normal_law_find(law->normal)->effects & TAL_EFFECT_HERTZ)
+    return sim->scene->material.damping > 0;
   return law->restitution < 1 || law->damping > 0;
 }
 
 void tal_step_effects(tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
-  if (any_damping(sim)) effects |= TAL_EFFECT_DAMPING;
-  if (any_friction(sim)) effects |= tal_tangential_law_find(scene->contact.tangential)->effects;
-  if ((scene->rotation && (effects & TAL_EFFECT_FRICTION)) || any_spin(&sim->grains)) effects |= TAL_EFFECT_SPIN;
-  if (scene->gravity[0] != 0 || scene->gravity[1] != 0) effects |= TAL_EFFECT_GRAVITY;
-  if (sim->boundary) effects |= TAL_EFFECT_BOUNDARY;
-  if (sim->walls.count) effects |= TAL_EFFECT_WALLS;
-  if (any_held_motion(&sim->grains)) effects |= TAL_EFFECT_HELD;
+  if (any_damping(sim))
+    effects |= TAL_EFFECT_DAMPING;
+  if (any_friction(sim))
+    effects |= tal_tangential_law_find(scene->contact.tangential)->effects;
+  if ((scene->rotation && (effects & TAL_EFFECT_FRICTION)) || any_spin(&sim->grains))
+    effects |= TAL_EFFECT_SPIN;
+  if (scene->gravity[0] != 0 || scene->gravity[1] != 0)
+    effects |= TAL_EFFECT_GRAVITY;
+  if (sim->boundary)
+    effects |= TAL_EFFECT_BOUNDARY;
+  if (sim->walls.count)
+    effects |= TAL_EFFECT_WALLS;
+  if (any_held_motion(&sim->grains))
+    effects |= TAL_EFFECT_HELD;
   sim->effects = effects;
 }
 
@@ -70,13 +83,15 @@ static void drive_with_observed(tal_sim *sim) {
 static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
   sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
   for (size_t w = 0; w < sim->walls.count; w++)
-    if (sim->walls.wall[w].plate != 0) sim->walls.wall[w].friction = sim->friction;
+    if (sim->walls.wall[w].plate != 0)
+      sim->walls.wall[w].friction = sim->friction;
 }
 
 static tal_status check_step(const tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   double critical = tal_critical_step(sim);
-  if (plan->integrator.force || sim->dt <= critical) return TAL_OK;
+  if (plan->integrator.force || sim->dt <= critical)
+    return TAL_OK;
   return tal_fail(err, TAL_INVALID,
                   "integrator.dt = %g s is above the critical step %.4g s of the contacts at t = %g s (stage %d, %s); "
                   "a smaller dt, or integrator.force: true at your own risk",
@@ -97,19 +112,23 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   run->stage_done = 0;
   run->stage_begun = 1;
   tal_status status = sim->stage->begin(sim, plan, err);
-  if (status) return status;
+  if (status)
+    return status;
   set_friction(sim, plan);
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);
   tal_sim_observe(sim);
-  if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err))) return status;
+  if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err)))
+    return status;
   tal_sim_observe(sim);
   tal_walls_take_loads(sim, 0);
   tal_energy_credit(sim, 0.5 * sim->dt);
   drive_with_observed(sim);
   run->force_evaluations++;
-  if ((status = tal_step_inspect(sim, err))) return status;
-  if ((status = check_step(sim, err))) return status;
+  if ((status = tal_step_inspect(sim, err)))
+    return status;
+  if ((status = check_step(sim, err)))
+    return status;
   return sim->stage->after_step(sim, plan, err);
 }
 
@@ -123,11 +142,13 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   if (run->strain_begun && sim->graph.valid && run->refresh_area > 0)
     run->log_volume += log(geo_loop_area(&sim->graph.loop, g->x, g->y) / run->refresh_area);
   tal_status status = tal_graph_refresh(&sim->graph, g, err);
-  if (status) return status;
+  if (status)
+    return status;
   run->refresh_area = geo_loop_area(&sim->graph.loop, g->x, g->y);
   run->refresh_step = run->step;
   run->refresh_strain = run->axial_strain;
-  if (sim->boundary) sim->boundary->refreshed(sim);
+  if (sim->boundary)
+    sim->boundary->refreshed(sim);
   return TAL_OK;
 }
 
@@ -144,12 +165,14 @@ static double largest_displacement_since_refresh(const tal_sim *sim) {
 static bool refresh_due(const tal_sim *sim) {
   const tal_scene_continuum *plan = &sim->scene->continuum;
   int64_t steps = sim->run.step - sim->run.refresh_step;
-  if (plan->refresh_steps > 0) return steps >= plan->refresh_steps;
+  if (plan->refresh_steps > 0)
+    return steps >= plan->refresh_steps;
   if (!isnan(plan->refresh_strain) && sim->run.axial_strain - sim->run.refresh_strain >= plan->refresh_strain)
     return true;
   // displacement is looked at every tenth step only; with a strain it is the confinement's criterion
   double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;
-  if (steps % 10 || (!isnan(plan->refresh_strain) && sim->run.strain_begun)) return false;
+  if (steps % 10 || (!isnan(plan->refresh_strain) && sim->run.strain_begun))
+    return false;
   return largest_displacement_since_refresh(sim) >= limit * 2 * sim->constants.mean_radius;
 }
 
@@ -186,9 +209,11 @@ static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
       *more = true;
       return TAL_OK;
     }
-    if (sim->run.stage_done) sim->run.stage++;
+    if (sim->run.stage_done)
+      sim->run.stage++;
     tal_status status = tal_step_begin_stage(sim, err);
-    if (status) return status;
+    if (status)
+      return status;
   }
   return TAL_OK;
 }
@@ -196,7 +221,8 @@ static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
 tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   bool more;
   tal_status status = enter_stage(sim, &more, err);
-  if (status || !more) return status;
+  if (status || !more)
+    return status;
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
   sim->stage->before_step(sim, plan); // pressure and wall velocities of the step (22)-(25)
@@ -207,9 +233,12 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   run->force_evaluations++;
   if (run->step % INSPECT_EVERY == 0) {
     tal_forces_expand(sim);
-    if ((status = tal_step_inspect(sim, err))) return status;
-    if ((status = check_step(sim, err))) return status;
+    if ((status = tal_step_inspect(sim, err)))
+      return status;
+    if ((status = check_step(sim, err)))
+      return status;
   }
-  if (tal_step_keeps_graph(sim) && refresh_due(sim) && (status = tal_step_refresh(sim, err))) return status;
+  if (tal_step_keeps_graph(sim) && refresh_due(sim) && (status = tal_step_refresh(sim, err)))
+    return status;
   return sim->stage->after_step(sim, plan, err);
 }

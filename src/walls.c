@@ -3,7 +3,9 @@
 #include <math.h>
 #include <stdlib.h>
 
-void tal_walls_init(tal_walls *walls) { *walls = (tal_walls){0}; }
+void tal_walls_init(tal_walls *walls) {
+  *walls = (tal_walls){0};
+}
 
 void tal_walls_clear(tal_walls *walls) {
   free(walls->wall);
@@ -22,22 +24,27 @@ tal_wall *tal_walls_add(tal_walls *walls) {
 
 tal_wall *tal_walls_plate(const tal_walls *walls, int side) {
   for (size_t w = 0; w < walls->count; w++)
-    if (walls->wall[w].plate == side) return &walls->wall[w];
+    if (walls->wall[w].plate == side)
+      return &walls->wall[w];
   return NULL;
 }
 
-bool tal_wall_active(const tal_wall *wall, double time) { return time >= wall->from_time && time < wall->until_time; }
+bool tal_wall_active(const tal_wall *wall, double time) {
+  return time >= wall->from_time && time < wall->until_time;
+}
 
 tal_wall_point tal_wall_nearest(const tal_wall *wall, double x, double y) {
-  if (wall->plate != 0) return (tal_wall_point){0, wall->plate, (y - wall->y0) * wall->plate};
-  double dx = wall->x1 - wall->x0, dy = wall->y1 - wall->y0;
-  double along = ((x - wall->x0) * dx + (y - wall->y0) * dy) / (dx * dx + dy * dy);
-  along = along < 0 ? 0 : along > 1 ? 1 : along;
-  double ex = x - (wall->x0 + along * dx), ey = y - (wall->y0 + along * dy);
-  double distance = sqrt(ex * ex + ey * ey);
-  if (distance == 0) { // on the line itself: any of the two sides
-    double length = sqrt(dx * dx + dy * dy);
-    return (tal_wall_point){-dy / length, dx / length, 0};
+  if (wall->plate != 0)
+    return (tal_wall_point){0, wall->plate, (y - wall->y0) * wall->plate};
+  double dx = wall->x1 - wall->x0, dy = wall->y1 - wall->y0, length = sqrt(dx * dx + dy * dy);
+  double ax = x - wall->x0, ay = y - wall->y0, tx = dx / length, ty = dy / length;
+  double along = ax * tx + ay * ty;
+  if (along > 0 && along < length) { // the normal is the wall's own, not a difference of nearly equal points
+    double left = tx * ay - ty * ax;
+    return left < 0 ? (tal_wall_point){ty, -tx, -left} : (tal_wall_point){-ty, tx, left};
   }
+  double ex = along > 0 ? x - wall->x1 : ax, ey = along > 0 ? y - wall->y1 : ay;
+  double distance = sqrt(ex * ex + ey * ey);
+  if (distance == 0) return (tal_wall_point){-ty, tx, 0}; // on the end itself: any direction
   return (tal_wall_point){ex / distance, ey / distance, distance};
 }

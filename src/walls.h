@@ -17,7 +17,8 @@
   X(double, friction, "1", STATE, "coefficient of friction")                                                           \
   X(double, from_time, "s", STATE, "there from this time on")                                                          \
   X(double, until_time, "s", STATE, "gone from this time on")                                                          \
-  X(double, plate, "1", STATE, "+1: plate pushing up (bottom), -1: plate pushing down (top), 0: a segment of the scene") \
+  X(double, plate, "1", STATE,                                                                                         \
+    "+1: plate pushing up (bottom), -1: plate pushing down (top), 0: a segment of the scene")                          \
   X(double, fx, "N", STATE, "force of the grains on the wall at the last step")                                        \
   X(double, fy, "N", STATE, "force of the grains on the wall at the last step")                                        \
   X(double, contact_stiffness, "N/m", STATE, "sum of the tangent stiffness of its contacts at the last step")          \

@@ -31,7 +31,8 @@ static void take_slot(const tal_sim *sim, tal_wall *wall, size_t c) {
   wall->friction_fy -= s->ft[c] * s->nx[c];
   wall->damping_fx -= s->fd[c] * s->nx[c];
   wall->damping_fy -= s->fd[c] * s->ny[c];
-  if (s->overlap[c] <= 0) return;
+  if (s->overlap[c] <= 0)
+    return;
   int hertz = (sim->effects & TAL_EFFECT_HERTZ) != 0;
   wall->contact_stiffness += hertz ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
   wall->contact_damping += hertz ? s->damping[c] * root : s->damping[c];
@@ -45,5 +46,6 @@ void tal_walls_take_loads(tal_sim *sim, double dt) {
   }
   for (size_t c = 0; c < sim->wall_contacts.count; c++)
     take_slot(sim, &sim->walls.wall[sim->wall_contacts.j[c]], c);
-  for (size_t w = 0; dt > 0 && w < sim->walls.count; w++) half_work(&sim->walls.wall[w], dt);
+  for (size_t w = 0; dt > 0 && w < sim->walls.count; w++)
+    half_work(&sim->walls.wall[w], dt);
 }

@@ -66,8 +66,8 @@ static inline double fitted_order(const double *dt, const double *error, size_t 
 // |value - expected| <= tolerance * scale, with both in the message.
 #define assert_near(value, expected, tolerance, scale)                                                                 \
   do {                                                                                                                 \
-    double near_value = (value), near_expected = (expected);                                                           \
-    double near_error = fabs(near_value - near_expected) / fabs(scale);                                                \
+    double near_value = (value), near_expected = (expected), near_scale = (scale);                                     \
+    double near_error = fabs((near_value - near_expected) / near_scale);                                               \
     if (!(near_error <= (tolerance)))                                                                                  \
       fail_msg("%s = %.17g, expected %.17g: off by %.3g, allowed %.3g", #value, near_value, near_expected, near_error, \
                (double)(tolerance));                                                                                   \

@@ -16,7 +16,8 @@ static inline double contact_radius(const ode_contact *k) {
   return k->plane ? k->i.r : k->i.r * k->j.r / (k->i.r + k->j.r);
 }
 
-// Young's modulus [Pa] that gives the contact its K, from eqs (2) and (3) written the other way round; a plane is rigid.
+// Young's modulus [Pa] that gives the contact its K, from eqs (2) and (3) written the other way round; a plane is
+// rigid.
 static inline double contact_young(const ode_contact *k) {
   double modulus = 0.75 * k->K / sqrt(contact_radius(k));
   return (k->plane ? 1 : 2) * (1 - contact_poisson * contact_poisson) * modulus;

@@ -1,8 +1,8 @@
 // Reference for one contact: the planar motion of two grains (or of a grain and a plane) that meet, integrated with
-// GSL's Runge-Kutta-Prince-Dormand 8(9) at tight tolerance. Written from vector mechanics (contact point, v + omega x l,
-// torque l x F), not from the engine's formulas. Kinks of the laws (Coulomb cap, clipping at zero, slip that stops) are
-// located by halving the step, so that the integrator only sees smooth pieces.
-// Starts at the instant of touching (or `overlap` deep) and ends when the normal force has fallen to zero.
+// GSL's Runge-Kutta-Prince-Dormand 8(9) at tight tolerance. Written from vector mechanics (contact point, v + omega x
+// l, torque l x F), not from the engine's formulas. Kinks of the laws (Coulomb cap, clipping at zero, slip that stops)
+// are located by halving the step, so that the integrator only sees smooth pieces. Starts at the instant of touching
+// (or `overlap` deep) and ends when the normal force has fallen to zero.
 #ifndef PHYSICS_ODE_H
 #define PHYSICS_ODE_H
 
@@ -37,6 +37,7 @@ typedef struct ode_contact {
 typedef struct ode_result {
   double time;               // [s] of the contact
   double overlap;            // [m] largest
+  double overlap_last;       // [m] at the end
   double vx[2], vy[2], w[2]; // [m/s, m/s, rad/s] at the end
   int sliding, sticking;     // steps taken in either state
   double stuck_share;        // largest |ft| / (mu fn) while slip was held at zero (regularised)
@@ -181,8 +182,8 @@ static inline double ode_cap_rate(const ode_run *run, const ode_state *s) {
   ode_accelerate(k, s, s->fn, s->ft, a);
   double across = s->turning * (k->plane ? 0 : s->arm_i + s->arm_j);
   double rate = -((a[0] - a[3]) * s->nx + (a[1] - a[4]) * s->ny) - across * s->turning; // of the approach
-  double force = k->hertz ? 1.5 * k->K * root * s->approach + k->C * (0.5 / root * s->approach * s->approach)
-                          : k->K * s->approach;
+  double force =
+      k->hertz ? 1.5 * k->K * root * s->approach + k->C * (0.5 / root * s->approach * s->approach) : k->K * s->approach;
   return k->mu * (force + k->C * root * rate);
 }
 
@@ -274,6 +275,7 @@ static inline ode_result ode_solve(const ode_contact *k, double time, double unt
     ode_state s;
     ode_observe(&run, y, &s);
     result.overlap = fmax(result.overlap, s.overlap);
+    result.overlap_last = s.overlap;
     result.sliding += run.mode == ODE_SLIDES || (k->kind == ODE_REGULARISED && run.mode == ODE_FREE);
     result.sticking += run.mode == ODE_HOLDS || (k->kind == ODE_SPRING && run.mode == ODE_FREE);
     if (run.mode == ODE_HOLDS && s.fn > 0)

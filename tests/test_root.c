@@ -51,8 +51,8 @@ static void test_over_usual_slips(void **state) {
       assert_within(exp(-30 + 45.0 * k / 20000), exponents[e]);
 }
 
-// ROUND: the neighbours of the places where the reduction changes over: sqrt(1/2) 2^k for the logarithm, 2^((n + 1/2) c)
-// for the exponential, and 1.
+// ROUND: the neighbours of the places where the reduction changes over: sqrt(1/2) 2^k for the logarithm, 2^((n + 1/2)
+// c) for the exponential, and 1.
 static void test_at_the_seams(void **state) {
   (void)state;
   for (int e = 0; e < EXPONENTS; e++) {

@@ -51,8 +51,7 @@ static tal_sim *create(const variant *v, int n, tal_scene *scene) {
           "mass_scaling: 1e5\ncontact: %s\nrotation: %s\n"
           "pack: {method: drop_and_roll, width: %g}\nintegrator: {dt: 1e-5}\n"
           "stages: [{kind: compress, pressure: 100e3, rate: 5e-3, strain: 0.2}]\n",
-          n, v->friction, strcmp(v->name, "linear") ? ", damping: 0.002" : "", v->contact, v->rotation,
-          1e-3 * sqrt(n));
+          n, v->friction, strcmp(v->name, "linear") ? ", damping: 0.002" : "", v->contact, v->rotation, 1e-3 * sqrt(n));
   fclose(out);
   tal_scene_errors errors;
   tal_error err;
@@ -62,8 +61,10 @@ static tal_sim *create(const variant *v, int n, tal_scene *scene) {
   else if (tal_sim_create(&sim, scene, &err))
     fprintf(stderr, "%s\n", err.text);
   unlink(path);
-  if (!sim) exit(1);
-  for (size_t i = 0; i < sim->grains.count; i++) sim->grains.r[i] *= 1.0004;
+  if (!sim)
+    exit(1);
+  for (size_t i = 0; i < sim->grains.count; i++)
+    sim->grains.r[i] *= 1.0004;
   tal_neighbours_rebuild(sim);
   return sim;
 }
@@ -82,18 +83,29 @@ static double phase(void (*body)(tal_sim *), tal_sim *sim, int count) {
   double time[REPEATS];
   for (int r = 0; r < REPEATS; r++) {
     double start = cpu_seconds();
-    for (int k = 0; k < count; k++) body(sim);
+    for (int k = 0; k < count; k++)
+      body(sim);
     time[r] = cpu_seconds() - start;
   }
   qsort(time, REPEATS, sizeof *time, ascending);
   return time[REPEATS / 2] / count;
 }
 
-static void one_step(tal_sim *sim) { steps(sim, 1); }
-static void sweep(tal_sim *sim) { tal_forces_sweep(sim, 0); }
-static void finish(tal_sim *sim) { tal_forces_finish_step(sim, 0); }
-static void rebuild(tal_sim *sim) { tal_neighbours_rebuild(sim); }
-static void refresh(tal_sim *sim) { tal_step_refresh(sim, NULL); }
+static void one_step(tal_sim *sim) {
+  steps(sim, 1);
+}
+static void sweep(tal_sim *sim) {
+  tal_forces_sweep(sim, 0);
+}
+static void finish(tal_sim *sim) {
+  tal_forces_finish_step(sim, 0);
+}
+static void rebuild(tal_sim *sim) {
+  tal_neighbours_rebuild(sim);
+}
+static void refresh(tal_sim *sim) {
+  tal_step_refresh(sim, NULL);
+}
 
 static void measure(const variant *v, int n) {
   tal_scene scene;
@@ -107,10 +119,11 @@ static void measure(const variant *v, int n) {
   double t_sweep = phase(sweep, sim, few), t_finish = phase(finish, sim, few), t_list = phase(rebuild, sim, few / 10),
          t_graph = phase(refresh, sim, few / 10) / 250;
   double rest = step - t_sweep - t_finish - t_list * listed - t_graph;
-  printf("%-40s %8d %7.1f   contacts %4.1f  gather+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
-         "%.2f\n",
-         v->name, n, 1e-6 * grains / step, 100 * t_sweep / step, 100 * t_finish / step, 100 * t_list * listed / step,
-         100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
+  printf(
+      "%-40s %8d %7.1f   contacts %4.1f  gather+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
+      "%.2f\n",
+      v->name, n, 1e-6 * grains / step, 100 * t_sweep / step, 100 * t_finish / step, 100 * t_list * listed / step,
+      100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
   fflush(stdout);
   tal_sim_free(sim);
   tal_scene_clear(&scene);
@@ -124,7 +137,8 @@ int main(int argc, char **argv) {
       measure(&variants[v], 4000);
       measure(&variants[v], 100000);
     }
-    for (int k = 1; k < argc; k++) measure(&variants[v], atoi(argv[k]));
+    for (int k = 1; k < argc; k++)
+      measure(&variants[v], atoi(argv[k]));
   }
   return 0;
 }
