@@ -16,9 +16,8 @@ double tal_energy_gravity(const tal_grains *g, const double gravity[2]) {
   double sum = 0;
   if (gravity[0] == 0 && gravity[1] == 0)
     return 0;
-  for (size_t i = 0; i < g->count; i++)
-    if (g->inverse_mass[i] > 0)
-      sum -= g->mass[i] * (gravity[0] * g->x[i] + gravity[1] * g->y[i]);
+  for (size_t i = 0; i < g->count; i++) // fixed grains too: what holds them works against their weight
+    sum -= g->mass[i] * (gravity[0] * g->x[i] + gravity[1] * g->y[i]);
   return sum;
 }
 
@@ -31,10 +30,6 @@ static double normal_energy(const tal_sim *sim, const tal_contacts *s, size_t c)
 
 static double spring_energy(const tal_contacts *s, size_t c) {
   return s->spring_stiffness[c] > 0 ? 0.5 * s->spring[c] * s->spring[c] / s->spring_stiffness[c] : 0;
-}
-
-double tal_energy_wall_slot(const tal_sim *sim, size_t c) {
-  return normal_energy(sim, &sim->wall_contacts, c);
 }
 
 double tal_energy_springs(const tal_sim *sim) {

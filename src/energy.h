@@ -9,8 +9,6 @@ double tal_energy_kinetic(const tal_grains *grains);                          //
 double tal_energy_gravity(const tal_grains *grains, const double gravity[2]); // [J]
 double tal_energy_elastic(const tal_sim *sim);                                // [J] springs included
 double tal_energy_springs(const tal_sim *sim);                                // [J] tangential springs alone
-// Elastic energy of one grain-wall slot's normal force [J].
-double tal_energy_wall_slot(const tal_sim *sim, size_t c);
 
 // Credits the grains' accounts with `weight` [s] times the power of the forces of this (observed) instant. A run
 // credits dt per step; the first and last instants of a stage count half.

@@ -2,7 +2,6 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
-#include "energy.h"
 #include "law.h"
 #include "sim.h"
 
@@ -93,18 +92,32 @@ static void list_pairs(tal_sim *sim) {
   sim->force_records = tal_alloc(sim->pairs.capacity, sizeof *sim->force_records);
 }
 
-// A wall that vanishes takes the elastic energy of its contacts with it.
-static void book_vanished(tal_sim *sim) {
-  for (size_t c = 0; c < sim->wall_contacts.count; c++) {
-    tal_wall *wall = &sim->walls.wall[sim->wall_contacts.j[c]];
-    if (!tal_wall_active(wall, sim->run.time))
-      wall->work -= tal_energy_wall_slot(sim, c);
+// Elastic energy [J] of a grain on a wall `back` seconds before the end of this step's drift.
+static double energy_on_wall(const tal_sim *sim, size_t i, const tal_wall *wall, double stiffness, double back) {
+  const tal_grains *g = &sim->grains;
+  double x = g->x[i] - back * (g->vx[i] - wall->vx), y = g->y[i] - back * (g->vy[i] - wall->vy);
+  double overlap = g->r[i] - tal_wall_nearest(wall, x, y).distance;
+  if (overlap <= 0)
+    return 0;
+  return sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_energy(stiffness, overlap) : tal_linear_energy(stiffness, overlap);
+}
+
+// A wall that vanishes takes the elastic energy of its contacts with it, one that appears brings it: that of the middle
+// of the step, because the force at its last or first instant acts over half a step.
+static void book_change(tal_sim *sim, const tal_contacts *slots, bool there) {
+  for (size_t c = 0; c < slots->count; c++) {
+    tal_wall *wall = &sim->walls.wall[slots->j[c]];
+    if ((wall->listed != 0) == there || tal_wall_active(wall, sim->run.time) != there)
+      continue;
+    size_t i = (size_t)slots->i[c];
+    double energy = energy_on_wall(sim, i, wall, slots->stiffness[c], 0);
+    energy += energy_on_wall(sim, i, wall, slots->stiffness[c], sim->dt);
+    wall->work += there ? 0.5 * energy : -0.5 * energy;
   }
 }
 
 static void list_walls(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  book_vanished(sim);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
   for (size_t i = 0; i < g->count; i++) {
@@ -123,6 +136,10 @@ static void list_walls(tal_sim *sim) {
   sim->neighbours.wall_first[g->count] = (int32_t)fresh.count;
   if (sim->effects & TAL_EFFECT_SPRING)
     carry_springs(&sim->wall_contacts, &fresh);
+  if (sim->neighbours.rebuilds > 0) { // what is there at the start is part of the start
+    book_change(sim, &sim->wall_contacts, false);
+    book_change(sim, &fresh, true);
+  }
   tal_contacts_swap(&sim->wall_contacts, &fresh);
   tal_contacts_clear(&fresh);
 }

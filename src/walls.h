@@ -32,7 +32,7 @@
   X(double, damping_work, "J", STATE, "its part through viscous forces")                                               \
   X(double, x_list, "m", WORK, "first end when the neighbour list was built")                                          \
   X(double, y_list, "m", WORK, "first end when the neighbour list was built")                                          \
-  X(double, listed, "1", WORK, "1: there when the neighbour list was built")
+  X(double, listed, "1", STATE, "1: there when the neighbour list was built")
 
 typedef struct tal_wall {
 #define X(type, name, unit, kept, meaning) type name;

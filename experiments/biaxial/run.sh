@@ -1,0 +1,35 @@
+#!/bin/sh
+# Runs the experiment: `run.sh` everything (about an hour and a half of one core), `run.sh --short` a check of the whole
+# chain in seconds. Finished runs are kept, interrupted ones are resumed. TALUS names the program, OUT the folder.
+set -eu
+here=$(cd "$(dirname "$0")" && pwd)
+talus=${TALUS:-$here/../../build/talus}
+out=${OUT:-$here/../../biaxial-run}
+mkdir -p "$out"
+
+run() { # folder, scene file, settings...
+  folder=$1 file=$2
+  shift 2
+  resume=
+  if [ -e "$out/$folder/checkpoint.h5" ]; then resume=--resume; fi
+  "$talus" run "$here/$file" -o "$out/$folder" $resume "$@"
+}
+
+if [ "${1:-}" = --short ]; then
+  trap 'rm -rf "$out"' EXIT
+  for scene in demo pressure; do
+    run "$scene" "$scene.yaml" -q --no-figures --set grains.count=150 --set pack.width=13e-3 --set stages.0.ramp=1 \
+      --set stages.1.strain=0.01 --set output.fields_every=1
+    "$talus" verify "$out/$scene"
+  done
+  sh "$here/summary.sh" "$out/demo" "$out/pressure"
+  exit 0
+fi
+
+for seed in 1 2 3 4 5; do run "demo-$seed" demo.yaml --set "seed=$seed"; done
+run fine-1 demo.yaml --set seed=1 --set stages.1.integrator.dt=2e-6
+for seed in 1 2 3 4 5; do run "pressure-$seed" pressure.yaml --set "seed=$seed"; done
+for kind in demo fine pressure; do
+  echo "== $kind"
+  sh "$here/summary.sh" "$out/$kind"-?
+done
