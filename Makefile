@@ -92,7 +92,8 @@ tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
-	@for e in experiments/*/run.sh; do echo "$$e --short"; TALUS=$(abspath $(OUT)/talus) sh $$e --short || exit 1; done
+	@for e in experiments/*/run.sh; do echo "$$e --short"; \
+	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)
 	@for b in $^; do $$b || exit 1; done
 

@@ -1,9 +1,13 @@
-// Free motion for a given duration: walls, gravity and contacts only.
+// Free motion for a given duration: walls, gravity and contacts only. Plates that are there stand still.
 #include "stage.h"
+
+#include "plates.h"
 
 static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   (void)plan, (void)err;
   sim->boundary = NULL;
+  if (tal_walls_plate(&sim->walls, +1))
+    tal_plates_drive(sim, 0);
   return TAL_OK;
 }
 

@@ -1,12 +1,14 @@
 // The neighbour list: complete at every step against a search over all pairs and walls, in the right order, and without
 // any influence on the motion: three skins give the same bits.
+#include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
-#include <setjmp.h>
 #include <stdint.h>
+
 #include <cmocka.h>
 
 #include "engine.h"
+#include "forces.h"
 #include <omp.h>
 
 static const double skins[] = {0.005, 0.02, 0.3};
@@ -122,6 +124,7 @@ static void run_all(writer *write, int steps, size_t least_pairs, size_t least_w
   for (int s = 0; s < steps && !tal_sim_done(e[0]->sim); s++)
     for (int k = 0; k < SKINS; k++) {
       engine_step(e[k]);
+      tal_forces_expand(e[k]->sim);
       pairs += check_pairs(e[k]->sim);
       walls += check_walls(e[k]->sim);
       check_incidences(e[k]->sim);
