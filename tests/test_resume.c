@@ -121,7 +121,7 @@ static const char biaxial[] =
     "contact: {tangential: %s}\npack: {method: drop_and_roll, width: %g}\ncontinuum: {refresh: 70}\n"
     "integrator: {dt: 1e-5}\n"
     "stages:\n  - {kind: confine, pressure: 100e3, ramp: %g, friction: 0.1, tolerance: 0.4, unbalanced: 1, "
-    "integrator: {dt: 2e-5}}\n"
+    "integrator: {dt: 1.25e-5}}\n"
     "  - {kind: compress, rate: 0.1, strain: %g}\n"
     "output: {series_every: 2e-4, fields_every: 4e-3, checkpoint_every: 3e-3, tracks: [3, 5]}\n";
 
@@ -197,7 +197,7 @@ static const char stages[] =
     "velocity: [0.01, 0]}, {from: [9e-3, -1], to: [9e-3, 1], friction: 0, from_time: 0.00105, until_time: 0.003}]\n"
     "stages:\n  - {kind: free, duration: 0.003}\n"
     "  - {kind: confine, pressure: 100e3, ramp: 0.01, friction: 0.1, tolerance: 0.8, unbalanced: 100, "
-    "integrator: {dt: 2e-5}}\n"
+    "integrator: {dt: 1.25e-5}}\n"
     "  - {kind: compress, rate: 0.5, strain: 0.002}\n  - {kind: free, duration: 0.001}\n"
     "  - {kind: compress, rate: 1, strain: 0.004, pressure: 2e5}\n";
 
