@@ -134,7 +134,7 @@ double tal_friction_step(const tal_sim *sim, double pressure) {
   const tal_constants *k = &sim->constants;
   double cap = sim->scene->material.friction * pressure * 2 * k->mean_radius * k->thickness;
   if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0))
-    return INFINITY;
+    return (double)INFINITY;
   // two free grains: the slip answers a tangential force with 2 (1/m + R^2/I)
   double turning = sim->scene->grains.shape == TAL_DISK ? 2 : 2.5;
   double answer = 2 * (1 + (sim->scene->rotation ? turning : 0));

@@ -175,7 +175,7 @@ static void mirror_symmetric_set_up(void **state) {
     snprintf(rest, sizeof rest, "walls: [{from: [-50, -1], to: [50, -1]}]\ngravity: [0, -10]\n%s", laws[k]);
     engine *e = start_cloud(pile, 3, rest);
     const tal_grains *g = &e->sim->grains;
-    double apart = 0, least = INFINITY;
+    double apart = 0, least = (double)INFINITY;
     for (int s = 0; s < 3000; s++) {
       engine_step(e);
       assert_true(g->x[0] == -g->x[1] && g->y[0] == g->y[1] && g->vx[0] == -g->vx[1] && g->vy[0] == g->vy[1]);

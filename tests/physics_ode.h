@@ -252,7 +252,7 @@ static inline void ode_scales(const ode_contact *k, double time, double *scale) 
   scale[ODE_FT] = ode_normal(k, k->length, 0);
 }
 
-// `time`: order of magnitude of the contact's duration [s]; `until`: stops there, INFINITY at the end of contact.
+// `time`: order of magnitude of the contact's duration [s]; `until`: stops there, HUGE_VAL at the end of contact.
 static inline ode_result ode_solve(const ode_contact *k, double time, double until) {
   ode_run run = {k, ODE_FREE, 0};
   gsl_odeiv2_system system = {ode_rates, NULL, ODE_SIZE, &run};
@@ -270,7 +270,7 @@ static inline ode_result ode_solve(const ode_contact *k, double time, double unt
     int status = gsl_odeiv2_evolve_apply(evolve, control, step, &system, &t, fmin(limit, until), &h, y);
     assert(status == GSL_SUCCESS);
     (void)status;
-    limit = INFINITY;
+    limit = HUGE_VAL;
     ode_event event = ode_look(&run, before, y);
     if (event != ODE_NOTHING && t - from > 1e-14 * time) {
       h = 0.5 * (t - from);
