@@ -23,9 +23,9 @@ typedef struct two_bodies {
 #define MEET                                                                                                           \
   "grains: {thickness: 1, list: [{x: -0.6, y: 0, r: 0.5, vx: 2, vy: 0.25, omega: 3}, "                                 \
   "{x: 0.5, y: 0.3, r: 0.4, vx: -1, omega: 1}]}\n"
-#define DROP "grains: {thickness: 1, list: [{x: 0.1, y: 0.55, r: 0.5, vx: 1.5, vy: -2, omega: 1}]}\n"
-#define FLOOR "walls: [{from: [-9, 0], to: [9, 0]}]\n"
-#define FREE "stages: [{kind: free, duration: 1}]\n"
+#define DROP   "grains: {thickness: 1, list: [{x: 0.1, y: 0.55, r: 0.5, vx: 1.5, vy: -2, omega: 1}]}\n"
+#define FLOOR  "walls: [{from: [-9, 0], to: [9, 0]}]\n"
+#define FREE   "stages: [{kind: free, duration: 1}]\n"
 #define RUBBER "material: {young: 1e4, density: 1, friction: 0.4, damping: 4e-3}\n"
 
 static const two_bodies cases[] = {
@@ -36,27 +36,40 @@ static const two_bodies cases[] = {
      0.2},
     {"regularised", MEET RUBBER "contact: {vR: 0.5, exponent: 2}\n" FREE, 0.2},
     {"spring", MEET RUBBER "contact: {tangential: spring}\n" FREE, 0.2},
-    {"spring linear", MEET "material: {density: 1, friction: 0.4}\n"
-                           "contact: {normal: linear, stiffness: 2e3, damping: 1, tangential: spring}\n" FREE, 0.2},
+    {"spring linear",
+     MEET "material: {density: 1, friction: 0.4}\n"
+          "contact: {normal: linear, stiffness: 2e3, damping: 1, tangential: spring}\n" FREE,
+     0.2},
     {"spins held", MEET RUBBER "rotation: false\ncontact: {tangential: spring}\n" FREE, 0.2},
     {"gravity and floor", DROP FLOOR RUBBER "gravity: [1, -9]\ncontact: {vR: 0.5, exponent: 2}\n" FREE, 0.5},
     {"gravity and floor, spring", DROP FLOOR RUBBER "gravity: [1, -9]\ncontact: {tangential: spring}\n" FREE, 0.5},
     {"end of a wall",
-     DROP "walls: [{from: [-9, 0], to: [0, 0]}]\n" RUBBER "gravity: [0, -9]\ncontact: {tangential: spring}\n" FREE, 0.5},
-    {"moving wall", DROP "walls: [{from: [-9, 0], to: [9, 0], velocity: [-1, 1.5]}]\n" RUBBER
-                         "gravity: [1, -9]\ncontact: {tangential: spring}\n" FREE, 0.5},
-    {"vanishing wall", DROP "walls: [{from: [-9, 0], to: [9, 0], velocity: [-1, 1.5], until_time: 0.0625}]\n" RUBBER
-                            "contact: {tangential: spring}\n" FREE, 0.2},
-    {"appearing wall", DROP "walls: [{from: [-9, 0.15], to: [9, 0.15], from_time: 0.03125}]\n" RUBBER
-                            "contact: {tangential: spring}\n" FREE, 0.2},
+     DROP "walls: [{from: [-9, 0], to: [0, 0]}]\n" RUBBER "gravity: [0, -9]\ncontact: {tangential: spring}\n" FREE,
+     0.5},
+    {"moving wall",
+     DROP "walls: [{from: [-9, 0], to: [9, 0], velocity: [-1, 1.5]}]\n" RUBBER
+          "gravity: [1, -9]\ncontact: {tangential: spring}\n" FREE,
+     0.5},
+    {"vanishing wall",
+     DROP "walls: [{from: [-9, 0], to: [9, 0], velocity: [-1, 1.5], until_time: 0.0625}]\n" RUBBER
+          "contact: {tangential: spring}\n" FREE,
+     0.2},
+    {"appearing wall",
+     DROP "walls: [{from: [-9, 0.15], to: [9, 0.15], from_time: 0.03125}]\n" RUBBER
+          "contact: {tangential: spring}\n" FREE,
+     0.2},
     {"spinning fixed grain",
      "grains: {thickness: 1, list: [{x: 0, y: 0, r: 0.5, omega: 20, fixed: true}, {x: 0.05, y: 0.92, r: 0.4}]}\n" RUBBER
-     "gravity: [0, -9]\ncontact: {vR: 0.5, exponent: 2}\n" FREE, 0.4},
+     "gravity: [0, -9]\ncontact: {vR: 0.5, exponent: 2}\n" FREE,
+     0.4},
     {"moving fixed grain",
-     "grains: {thickness: 1, list: [{x: 0, y: 0, r: 0.5, vx: 1, vy: 2, fixed: true}, {x: 0.3, y: 0.92, r: 0.4}]}\n"
-     RUBBER "gravity: [0, -9]\ncontact: {tangential: spring}\n" FREE, 0.4},
-    {"two stages", MEET RUBBER "contact: {vR: 0.5, exponent: 2}\n"
-                               "stages: [{kind: free, duration: 0.125}, {kind: free, duration: 1}]\n", 0.2},
+     "grains: {thickness: 1, list: [{x: 0, y: 0, r: 0.5, vx: 1, vy: 2, fixed: true}, {x: 0.3, y: 0.92, r: "
+     "0.4}]}\n" RUBBER "gravity: [0, -9]\ncontact: {tangential: spring}\n" FREE,
+     0.4},
+    {"two stages",
+     MEET RUBBER "contact: {vR: 0.5, exponent: 2}\n"
+                 "stages: [{kind: free, duration: 0.125}, {kind: free, duration: 1}]\n",
+     0.2},
 };
 enum { CASES = sizeof cases / sizeof *cases, LEVELS = 6 };
 
@@ -124,8 +137,9 @@ static void put_box(FILE *to, int columns, int rows, double speed) {
     double most = fixed ? 0.1 : speed;
     fprintf(to, "  - {x: %.17g, y: %.17g, r: %.17g, vx: %.17g, vy: %.17g, omega: %.17g, fixed: %s}\n",
             2.2 * (k % columns + 0.5) + uniform(random, -0.1, 0.1),
-            2.2 * (k / columns + 0.5) + uniform(random, -0.1, 0.1), uniform(random, 0.5, 1), uniform(random, -most, most),
-            uniform(random, -most, most), uniform(random, -speed, speed), fixed ? "true" : "false");
+            2.2 * (k / columns + 0.5) + uniform(random, -0.1, 0.1), uniform(random, 0.5, 1),
+            uniform(random, -most, most), uniform(random, -most, most), uniform(random, -speed, speed),
+            fixed ? "true" : "false");
   }
   double width = 2.2 * columns, height = 2.2 * rows;
   fprintf(to,
@@ -164,9 +178,9 @@ static losses losses_now(const tal_sim *sim) {
   return sum;
 }
 
-// ROUND: what the ledger says was lost is the sum over steps and contacts of force times slip and of viscous force times
-// approach, worked out here from the contacts; the ledger works it out from the grains and the walls. Springs keep what
-// they hold. Sums of 1e6 terms.
+// ROUND: what the ledger says was lost is the sum over steps and contacts of force times slip and of viscous force
+// times approach, worked out here from the contacts; the ledger works it out from the grains and the walls. Springs
+// keep what they hold. Sums of 1e6 terms.
 static void losses_are_those_of_the_contacts(void **state) {
   (void)state;
   static const char *const laws[] = {"contact: {vR: 1e-2}\n", "contact: {tangential: spring}\n"};
@@ -254,7 +268,8 @@ static void thousand_grains_in_a_box(void **state) {
   for (int k = 0; k < 2; k++) {
     draft *d = draft_begin();
     put_box(d->to, 40, 25, 1);
-    fprintf(d->to, SAND "%sgravity: [1, -10]\nintegrator: {dt: 2e-4}\nstages: [{kind: free, duration: 1.5}]\n", laws[k]);
+    fprintf(d->to, SAND "%sgravity: [1, -10]\nintegrator: {dt: 2e-4}\nstages: [{kind: free, duration: 1.5}]\n",
+            laws[k]);
     engine *e = engine_start(d);
     assert_closes(e, 50, 1e-4);
     engine_end(e);
@@ -283,8 +298,10 @@ static void biaxial_test(void **state) {
 int main(void) {
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(residual_is_of_second_order), cmocka_unit_test(losses_are_those_of_the_contacts),
-      cmocka_unit_test(stored_energies),             cmocka_unit_test(thousand_grains_in_a_box),
+      cmocka_unit_test(residual_is_of_second_order),
+      cmocka_unit_test(losses_are_those_of_the_contacts),
+      cmocka_unit_test(stored_energies),
+      cmocka_unit_test(thousand_grains_in_a_box),
       cmocka_unit_test(biaxial_test),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

@@ -79,7 +79,8 @@ static void biaxial(FILE *to, units u, const char *tangential) {
   fputs(", radius: ", to);
   MAP(to, u, ", law: uniform", {"min", 0.5e-3, "m"}, {"max", 1e-3, "m"});
   fputs("}\nmaterial: ", to);
-  MAP(to, u, ", poisson: 0.3, friction: 0.45", {"young", 30e9, "Pa"}, {"density", 2675, "kg/m^3"}, {"damping", 2e-3, "s"});
+  MAP(to, u, ", poisson: 0.3, friction: 0.45", {"young", 30e9, "Pa"}, {"density", 2675, "kg/m^3"},
+      {"damping", 2e-3, "s"});
   fprintf(to, "\nmass_scaling: 1e5\ncontact: {tangential: %s}\npack: ", tangential);
   MAP(to, u, ", method: drop_and_roll", {"width", 14e-3, "m"});
   fputs("\ncontinuum: {refresh: 50}\nintegrator: ", to);

@@ -178,13 +178,14 @@ static void ratio_20(FILE *to) {
 static void moving_walls(FILE *to) {
   put_grains(to, 8, 2.4, 0.4, 1.0, 2);
   put_box(to, 21.6);
-  fprintf(to, "  - {from: [-9, 1], to: [-2, 1], velocity: [25, 0.5]}\n"
-              "  - {from: [30, 2], to: [30, 15], velocity: [-16, 0]}\n"
-              "  - {from: [4, -5], to: [9, -3], velocity: [0, 10], friction: 0}\n"
-              "  - {from: [10.8, 0], to: [10.8, 21.6], until_time: 0.3}\n"
-              "  - {from: [0, 4.8], to: [21.6, 4.8], from_time: 0.5, until_time: 0.7, velocity: [0, 1]}\n"
-              "material: {density: 1, friction: 0.4}\ncontact: {normal: linear, stiffness: 2e4, damping: 20, vR: 1e-3}\n"
-              "limits: {overlap: 1}\nintegrator: {dt: 1e-3}\nstages: [{kind: free, duration: 1.2}]\n");
+  fprintf(to,
+          "  - {from: [-9, 1], to: [-2, 1], velocity: [25, 0.5]}\n"
+          "  - {from: [30, 2], to: [30, 15], velocity: [-16, 0]}\n"
+          "  - {from: [4, -5], to: [9, -3], velocity: [0, 10], friction: 0}\n"
+          "  - {from: [10.8, 0], to: [10.8, 21.6], until_time: 0.3}\n"
+          "  - {from: [0, 4.8], to: [21.6, 4.8], from_time: 0.5, until_time: 0.7, velocity: [0, 1]}\n"
+          "material: {density: 1, friction: 0.4}\ncontact: {normal: linear, stiffness: 2e4, damping: 20, vR: 1e-3}\n"
+          "limits: {overlap: 1}\nintegrator: {dt: 1e-3}\nstages: [{kind: free, duration: 1.2}]\n");
 }
 
 static void biaxial(FILE *to) {

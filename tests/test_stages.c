@@ -33,9 +33,8 @@ static void number_of_steps(void **state) {
   static const struct {
     double duration, dt;
     int64_t steps;
-  } cases[] = {{1e-2, 1e-4, 100}, {0.3, 0.1, 3},   {12.4e-3, 1e-3, 12}, {12.6e-3, 1e-3, 13},
-               {0.7, 0.1, 7},     {1e-3, 1e-3, 1}, {6e-4, 1e-3, 1},     {1, 1.0 / 3, 3},
-               {4e-4, 1e-3, 0}};
+  } cases[] = {{1e-2, 1e-4, 100}, {0.3, 0.1, 3},   {12.4e-3, 1e-3, 12}, {12.6e-3, 1e-3, 13}, {0.7, 0.1, 7},
+               {1e-3, 1e-3, 1},   {6e-4, 1e-3, 1}, {1, 1.0 / 3, 3},     {4e-4, 1e-3, 0}};
   for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
     draft *d = draft_begin();
     fprintf(d->to,
@@ -148,8 +147,8 @@ static void assert_steps(const char *rest, const int64_t *expected, int count) {
   folder_remove(&f);
 }
 
-// EXACT: rows at the start, every whole number of steps nearest to series_every from the start of each stage, at the end
-// of each stage; every step where series_every is at or below dt; no time twice.
+// EXACT: rows at the start, every whole number of steps nearest to series_every from the start of each stage, at the
+// end of each stage; every step where series_every is at or below dt; no time twice.
 static void rows_of_the_series(void **state) {
   (void)state;
 #define ROWS(rest, ...)                                                                                                \
@@ -159,8 +158,8 @@ static void rows_of_the_series(void **state) {
   ROWS("stages: [{kind: free, duration: 5e-3}]\noutput: {series_every: 1e-9}\n", 0, 1, 2, 3, 4, 5);
   ROWS("stages: [{kind: free, duration: 7e-3}]\noutput: {series_every: 2.6e-3}\n", 0, 3, 6, 7);
   ROWS("stages: [{kind: free, duration: 7e-3}]\noutput: {series_every: .inf}\n", 0, 7);
-  ROWS("stages: [{kind: free, duration: 5e-3}, {kind: free, duration: 5e-3}]\noutput: {series_every: 3e-3}\n", 0, 3, 5, 8,
-       10);
+  ROWS("stages: [{kind: free, duration: 5e-3}, {kind: free, duration: 5e-3}]\noutput: {series_every: 3e-3}\n", 0, 3, 5,
+       8, 10);
   ROWS("stages: [{kind: free, duration: 2e-3}, {kind: free, duration: 1e-3, integrator: {dt: 2.5e-4}}]\n"
        "output: {series_every: 5e-4, fields_every: 1e-3}\n",
        0, 1, 2, 4, 6);
@@ -174,8 +173,8 @@ static void rows_of_the_series(void **state) {
 
 // ---- free flight and listed grains ----
 
-// ROUND: under a constant force velocity Verlet is exact: a throw to k eps after k steps; spin and fixed grains likewise.
-// Mass has no say in it, mass_scaling neither.
+// ROUND: under a constant force velocity Verlet is exact: a throw to k eps after k steps; spin and fixed grains
+// likewise. Mass has no say in it, mass_scaling neither.
 static void ballistic_flight(void **state) {
   (void)state;
   engine *e = start("grains: {thickness: 1, list: [{x: 1, y: 2, r: 0.1, vx: 3, vy: 4, omega: 5}, "
@@ -200,8 +199,8 @@ static void ballistic_flight(void **state) {
   engine_end(e);
 }
 
-// ROUND: two grains in a linear contact: the acceleration is the force over the grain's own mass, the turning the torque
-// over its own inertia; with rotation: false the spins stay to the bit, though friction acts.
+// ROUND: two grains in a linear contact: the acceleration is the force over the grain's own mass, the turning the
+// torque over its own inertia; with rotation: false the spins stay to the bit, though friction acts.
 static void own_mass_and_inertia(void **state) {
   (void)state;
   for (int held = 0; held < 2; held++) {
@@ -321,7 +320,8 @@ static void assert_refused(const char *text, tal_status expected, const char *re
 // EXACT: what the scene alone proves is bad input; what the packing shows is an invalid run; force: true runs.
 static void refused_at_the_start(void **state) {
   (void)state;
-#define TOUCHING "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 1.5, y: 0, r: 1}]}\nmaterial: {density: 1, young: 1e6}\n"
+#define TOUCHING                                                                                                       \
+  "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 1.5, y: 0, r: 1}]}\nmaterial: {density: 1, young: 1e6}\n"
   assert_refused(TOUCHING "contact: {normal: linear, stiffness: 1e4}\nintegrator: {dt: 1}\n"
                           "stages: [{kind: free, duration: 9}]\n",
                  TAL_BAD_INPUT, "integrator.dt: 1 s is above the critical step");
@@ -335,8 +335,8 @@ static void refused_at_the_start(void **state) {
 int main(void) {
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(number_of_steps),  cmocka_unit_test(stage_after_stage),
-      cmocka_unit_test(rows_of_the_series), cmocka_unit_test(ballistic_flight),
+      cmocka_unit_test(number_of_steps),      cmocka_unit_test(stage_after_stage),
+      cmocka_unit_test(rows_of_the_series),   cmocka_unit_test(ballistic_flight),
       cmocka_unit_test(own_mass_and_inertia), cmocka_unit_test(invalid_runs),
       cmocka_unit_test(refused_at_the_start),
   };
