@@ -21,7 +21,8 @@ static void print_effects(const tal_sim *sim) {
                {TAL_EFFECT_GRAVITY, "gravity"},
                {TAL_EFFECT_BOUNDARY, "boundary forces"},
                {TAL_EFFECT_WALLS, "walls or plates"},
-               {TAL_EFFECT_HELD, "driven grains"}};
+               {TAL_EFFECT_HELD, "driven grains"},
+               {TAL_EFFECT_IMPLICIT, "friction solved implicitly"}};
   printf("effects       ");
   if (!(sim->effects & TAL_EFFECT_HERTZ))
     printf("linear contact");
@@ -122,7 +123,7 @@ static void print_numbers(const tal_sim *sim) {
     printf(", %.3g for two mean grains under the load of the scene", scene->integrator.dt / confined);
   printf("\n");
   double friction = tal_friction_step(sim, pressure);
-  if (isfinite(friction))
+  if (isfinite(friction) && !(sim->effects & TAL_EFFECT_IMPLICIT))
     printf("friction      explicit steps above %.3g s chatter by more than vR; dt is %.3g times that\n", friction,
            scene->integrator.dt / friction);
   if (isfinite(rate) && isfinite(pressure))

@@ -24,7 +24,7 @@ static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, dou
   double root = sqrt(s->overlap[c]);
   *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
   *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
-  if (sim->effects & TAL_EFFECT_SPRING) {
+  if ((sim->effects & TAL_EFFECT_SPRING) && !(sim->effects & TAL_EFFECT_IMPLICIT)) {
     const tal_grains *g = &sim->grains;
     int32_t i = s->i[c];
     double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;

@@ -133,10 +133,14 @@ TAL_KERNEL void sweep_block(tal_sim *sim, double dt, tal_law_constants constants
   X(TAL_EFFECT_DAMPING)                                                                                                \
   X(0)
 
+static unsigned law_effects(const tal_sim *sim) {
+  return sim->effects & (sim->effects & TAL_EFFECT_IMPLICIT ? TAL_EFFECT_NORMAL : TAL_EFFECT_LAW);
+}
+
 // The switch stands inside the parallel loop: a parallel region is outlined before inlining, and a mask passed into it
 // would no longer be a constant.
 static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, size_t start) {
-  switch (sim->effects & TAL_EFFECT_LAW) {
+  switch (law_effects(sim)) {
 #define X(mask)                                                                                                        \
   case (mask):                                                                                                         \
     sweep_block(sim, dt, constants, start, (mask));                                                                    \
@@ -144,7 +148,7 @@ static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, 
     VARIANTS(X)
 #undef X
   default:
-    sweep_block(sim, dt, constants, start, sim->effects & TAL_EFFECT_LAW);
+    sweep_block(sim, dt, constants, start, law_effects(sim));
   }
 }
 
@@ -164,14 +168,14 @@ static void wall_slot(tal_sim *sim, double dt, tal_law_constants constants, size
   m.approach = -(near.nx * ux + near.ny * uy);
   m.slip = slip_speed(near.nx, near.ny, ux, uy, m.overlap, g->r * g->spin, g->spin, sim->effects);
   m.slip_distance = dt * slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r * g->spin, g->spin, sim->effects);
-  tal_law_force f = tal_contact_law(m, constants, sim->effects);
+  tal_law_force f = tal_contact_law(m, constants, law_effects(sim));
   slots->nx[c] = near.nx;
   slots->ny[c] = near.ny;
   slots->overlap[c] = m.overlap;
   slots->fe[c] = f.fe;
   slots->fd[c] = f.fd;
   slots->ft[c] = f.ft;
-  if (dt > 0) {
+  if (dt > 0 && !(sim->effects & TAL_EFFECT_IMPLICIT)) {
     slots->spring[c] = f.ft;
     slots->spring_stiffness[c] = f.spring_stiffness;
   }
@@ -271,6 +275,10 @@ TAL_KERNEL tal_resultant gather(const tal_sim *sim, size_t grain, unsigned effec
 
 tal_resultant tal_forces_gather(const tal_sim *sim, size_t grain) {
   return gather(sim, grain, sim->effects | TAL_EFFECT_SPIN);
+}
+
+tal_resultant tal_forces_gather_normal(const tal_sim *sim, size_t grain) {
+  return gather(sim, grain, sim->effects & ~(unsigned)TAL_EFFECT_FRICTION);
 }
 
 void tal_forces_resultants(tal_sim *sim) {

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-static const tal_integrator *const integrators[] = {&tal_verlet, NULL};
+static const tal_integrator *const integrators[] = {&tal_verlet, &tal_implicit_friction, NULL};
 
 const tal_integrator *tal_integrator_find(const char *name) {
   for (const tal_integrator *const *k = integrators; *k; k++)

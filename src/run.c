@@ -1,6 +1,7 @@
 #include "run.h"
 
 #include "critical.h"
+#include "effects.h"
 #include "output.h"
 #include "progress.h"
 
@@ -52,7 +53,7 @@ typedef struct job {
 // What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
 static size_t warnings(const job *this, char text[200], const char *out[1]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
-  if (!(this->sim->dt > friction))
+  if (!(this->sim->dt > friction) || (this->sim->effects & TAL_EFFECT_IMPLICIT))
     return 0;
   snprintf(text, 200,
            "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",

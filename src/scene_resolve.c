@@ -60,6 +60,12 @@ static void resolve_stage_integrator(const tal_scene *scene, tal_scene_stage *st
     stage->integrator.dt = own.dt;
   if (tal_node_find(node, "integrator.force"))
     stage->integrator.force = own.force;
+  if (own.sweeps > 0)
+    stage->integrator.sweeps = own.sweeps;
+  if (stage->integrator.sweeps < 1)
+    stage->integrator.sweeps = 1;
+  if (!isnan(own.tolerance))
+    stage->integrator.tolerance = own.tolerance;
 }
 
 static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report) {

@@ -202,6 +202,11 @@ static const tal_key integrator_keys[] = {
     {KEY("scheme", CHOICE), .fallback = "verlet", CHOOSE(tal_integrator_choices), AT(tal_scene_integrator, scheme),
      .help = "time integrator"},
     {KEY("dt", REAL), .unit = "s", .required = true, POSITIVE, AT(tal_scene_integrator, dt), .help = "time step"},
+    {KEY("sweeps", WHOLE), ONLY("scheme", "implicit_friction"), .fallback = "1", FROM(1, 1000),
+     AT(tal_scene_integrator, sweeps), .help = "over all contacts in a step: friction is corrected contact by contact"},
+    {KEY("tolerance", REAL), ONLY("scheme", "implicit_friction"), .note = "none: sweeps alone", POSITIVE,
+     AT(tal_scene_integrator, tolerance),
+     .help = "sweeps on (at most 200 more) while a friction force changes by more than this share of mu f_n"},
     {KEY("force", BOOL), .fallback = "false", AT(tal_scene_integrator, force),
      .help = "runs above the critical time step, at the user's risk"},
     {.name = NULL}};
@@ -211,6 +216,10 @@ static const tal_key stage_integrator_keys[] = {
      .help = "time integrator of this stage"},
     {KEY("dt", REAL), .unit = "s", .note = "the scene's", POSITIVE, AT(tal_scene_integrator, dt),
      .help = "time step of this stage"},
+    {KEY("sweeps", WHOLE), ONLY("scheme", "implicit_friction"), .note = "the scene's, else 1", FROM(1, 1000),
+     AT(tal_scene_integrator, sweeps), .help = "over all contacts in a step of this stage"},
+    {KEY("tolerance", REAL), ONLY("scheme", "implicit_friction"), .note = "the scene's", POSITIVE,
+     AT(tal_scene_integrator, tolerance), .help = "of the friction forces in this stage"},
     {KEY("force", BOOL), .note = "the scene's", AT(tal_scene_integrator, force),
      .help = "runs above the critical time step, at the user's risk"},
     {.name = NULL}};

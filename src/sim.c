@@ -162,6 +162,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_contacts_clear(&sim->wall_contacts);
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
+  tal_friction_clear(&sim->sticking);
   free(sim->grain_records);
   free(sim->force_records);
   tal_graph_clear(&sim->graph);
@@ -185,6 +186,8 @@ tal_observed tal_sim_observe(tal_sim *sim) {
     sim->boundary->apply(sim);
   tal_forces_see_now(sim);
   tal_forces_sweep(sim, 0);
+  if (sim->effects & TAL_EFFECT_IMPLICIT)
+    tal_friction_solve(sim, 0.5 * sim->dt, false);
   return tal_sim_driving(sim);
 }
 

@@ -50,6 +50,11 @@ static bool any_damping(const tal_sim *sim) {
   return law->restitution < 1 || law->damping > 0;
 }
 
+static const char *scheme(const tal_sim *sim) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  return plan ? plan->integrator.scheme : sim->scene->integrator.scheme;
+}
+
 void tal_step_effects(tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
@@ -67,6 +72,8 @@ void tal_step_effects(tal_sim *sim) {
     effects |= TAL_EFFECT_WALLS;
   if (any_held_motion(&sim->grains))
     effects |= TAL_EFFECT_HELD;
+  if ((effects & TAL_EFFECT_FRICTION) && tal_integrator_find(scheme(sim))->implicit)
+    effects |= TAL_EFFECT_IMPLICIT;
   sim->effects = effects;
 }
 
