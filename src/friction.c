@@ -8,8 +8,8 @@
 
 #include <stdlib.h>
 
-// Contacts of a colour from which threads pay, and contacts of one sum.
-enum { PARALLEL_FROM = 2000, SUM_BLOCK = 1024 };
+// Contacts of a colour, or grains, from which threads pay; contacts taken at a time.
+enum { PARALLEL_FROM = 2000, BLOCK = 64, LANES = 8 };
 // Sweeps beyond the scene's number when friction would do work, or while the tolerance is not met.
 enum { MORE_SWEEPS = 20, MOST_SWEEPS = 200 };
 
@@ -152,11 +152,13 @@ static void set_compliances(tal_friction_system *system, double kick, bool sprin
   for (size_t k = 0; k < system->count; k++) {
     tal_friction_contact *c = &system->contact[k];
     const tal_friction_body *i = &body[c->i], *j = &body[c->j];
-    c->compliance = i->inverse_mass + j->inverse_mass + c->arm_i * c->arm_i * i->inverse_inertia +
-                    c->arm_j * c->arm_j * j->inverse_inertia;
+    double compliance = i->inverse_mass + j->inverse_mass + c->arm_i * c->arm_i * i->inverse_inertia +
+                        c->arm_j * c->arm_j * j->inverse_inertia;
+    c->given = compliance * kick;
+    c->before = slip_before(c, body);
     if (!spring)
       continue;
-    double moved = advances ? c->spring - c->spring_stiffness * kick * slip_before(c, body) : c->spring;
+    double moved = advances ? c->spring - c->spring_stiffness * kick * c->before : c->spring;
     c->spring = fmax(-c->cap, fmin(c->cap, moved));
   }
 }
@@ -167,9 +169,13 @@ static void set_compliances(tal_friction_system *system, double kick, bool sprin
 typedef struct solve {
   tal_friction_system *system;
   size_t grains;
-  double kick, inverse_vR, exponent;
+  double kick, inverse_vR, exponent, inverse_exponent;
   bool spring, advances;
 } solve;
+
+static double spring_force(const solve *s, const tal_friction_contact *c, double free) {
+  return tal_implicit_spring(c->spring, c->spring_stiffness * s->kick, free, c->before, c->given, c->cap);
+}
 
 // Gives the two bodies the impulse `p` [N s] along t. A wall is nobody's to write.
 static void push(const solve *s, const tal_friction_contact *c, double p) {
@@ -186,26 +192,39 @@ static void push(const solve *s, const tal_friction_contact *c, double p) {
   j->spin -= c->arm_j * p * j->inverse_inertia;
 }
 
-static double regularised_root(const solve *s, const tal_friction_contact *c, double free) {
-  double share =
-      tal_implicit_share(fabs(free) * s->inverse_vR, c->compliance * s->kick * c->cap * s->inverse_vR, s->exponent);
-  return free > 0 ? -c->cap * share : c->cap * share;
+// Shares of the caps, regularised law. The block is filled up to whole vectors: a scalar rest took most of the time.
+static void find_shares(const solve *s, double *free, double *brake, double *share, int count) {
+  const double inverse_vR = s->inverse_vR, exponent = s->exponent, inverse_exponent = s->inverse_exponent;
+  const int whole = (count + LANES - 1) / LANES * LANES;
+  for (int k = count; k < whole; k++)
+    free[k] = brake[k] = 0;
+#pragma omp simd
+  for (int k = 0; k < whole; k++)
+    share[k] = tal_implicit_share(fabs(free[k]) * inverse_vR, brake[k], exponent, inverse_exponent);
 }
 
-// The force that is right if nothing else changes; returns the change [N].
-static double correct(const solve *s, tal_friction_contact *c) {
-  double given = c->compliance * s->kick, free = slip_of(c, s->system->body) - given * c->force, force;
+// The forces that are right if nothing else changes, for contacts that share no grain; the largest change over the cap.
+static double correct_block(const solve *s, const int32_t *order, int count) {
+  tal_friction_contact *contact = s->system->contact;
+  double free[BLOCK], brake[BLOCK], share[BLOCK], largest = 0;
+  for (int k = 0; k < count; k++) {
+    const tal_friction_contact *c = &contact[order[k]];
+    free[k] = slip_of(c, s->system->body) - c->given * c->force;
+    brake[k] = c->given * c->cap * s->inverse_vR;
+  }
   if (!s->spring)
-    force = regularised_root(s, c, free);
-  else if (s->advances)
-    force = tal_implicit_spring(c->spring, c->spring_stiffness * s->kick, free, slip_before(c, s->system->body), given,
-                                c->cap);
-  else
-    force = c->spring;
-  double change = force - c->force;
-  c->force = force;
-  push(s, c, s->kick * change);
-  return change;
+    find_shares(s, free, brake, share, count);
+  for (int k = 0; k < count; k++) {
+    tal_friction_contact *c = &contact[order[k]];
+    double force = free[k] > 0 ? -c->cap * share[k] : c->cap * share[k];
+    if (s->spring)
+      force = s->advances ? spring_force(s, c, free[k]) : c->spring;
+    double change = force - c->force, part = fabs(change) / c->cap;
+    c->force = force;
+    push(s, c, s->kick * change);
+    largest = part > largest ? part : largest;
+  }
+  return largest;
 }
 
 // One sweep over all colours; the largest change of a force over its cap.
@@ -213,12 +232,13 @@ static double sweep(const solve *s) {
   tal_friction_system *system = s->system;
   double largest = 0;
   for (size_t k = 0; k < system->colour_count; k++) {
-    int32_t from = system->first[k], to = system->first[k + 1];
-    bool threads = to - from > PARALLEL_FROM && !(system->serial_last && k + 1 == system->colour_count);
-#pragma omp parallel for schedule(static) reduction(max : largest) if (threads)
-    for (int32_t m = from; m < to; m++) {
-      tal_friction_contact *c = &system->contact[system->order[m]];
-      largest = fmax(largest, fabs(correct(s, c)) / c->cap);
+    const int32_t from = system->first[k], to = system->first[k + 1];
+    const bool serial = system->serial_last && k + 1 == system->colour_count;
+    const int32_t size = serial ? 1 : BLOCK;
+#pragma omp parallel for schedule(static) reduction(max : largest) if (to - from > PARALLEL_FROM && !serial)
+    for (int32_t m = from; m < to; m += size) {
+      double change = correct_block(s, system->order + m, to - m < size ? to - m : size);
+      largest = change > largest ? change : largest;
     }
   }
   system->sweeps++;
@@ -239,7 +259,7 @@ static double work(const solve *s) {
   double sum = 0;
   for (size_t k = 0; k < s->system->count; k++) {
     const tal_friction_contact *c = &s->system->contact[k];
-    sum += 0.5 * s->kick * c->force * (slip_before(c, s->system->body) + slip_of(c, s->system->body));
+    sum += 0.5 * s->kick * c->force * (c->before + slip_of(c, s->system->body));
   }
   return sum;
 }
@@ -305,7 +325,8 @@ void tal_friction_solve(tal_sim *sim, double kick, bool advances) {
   tal_friction_colour(system, sim->grains.count);
   set_bodies(sim, kick);
   set_compliances(system, kick, spring, advances);
-  solve s = {system, sim->grains.count, kick, 1 / sim->constants.vR, law->exponent, spring, advances};
+  solve s = {system,        sim->grains.count, kick,   1 / sim->constants.vR,
+             law->exponent, 1 / law->exponent, spring, advances};
   const tal_scene_stage *stage = tal_sim_stage(sim);
   settle(&s, stage ? &stage->integrator : &sim->scene->integrator);
   for (size_t k = 0; k < system->count; k++)

@@ -25,8 +25,9 @@ typedef struct tal_friction_contact {
   int32_t slot, at_wall;   // in sim->pairs, or in sim->wall_contacts when at_wall
   double nx, ny;           // unit normal into i
   double arm_i, arm_j;     // [m]
-  double compliance;       // [1/kg] slip per impulse
   double cap;              // [N] mu fn
+  double given;            // [m/(s N)] slip per force over the kick
+  double before;           // [m/s] slip at the start of the kick
   double force;            // [N] found so far
   double spring;           // [N] spring law: force of the spring at this instant
   double spring_stiffness; // [N/m]
