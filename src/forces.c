@@ -296,8 +296,8 @@ void tal_forces_resultants(tal_sim *sim) {
 }
 
 // One grain: force, second half kick, and the work of this step's forces: dt f . v is the exact discrete work of a
-// force that acts over the two half kicks around the instant of v [eq (16)].
-TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects) {
+// force that acts over the two half kicks around the instant of v [eq (16)]; credit is their common length.
+TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, double credit, unsigned effects) {
   tal_grains *g = &sim->grains;
   tal_resultant f = gather(sim, i, effects);
   double fx = f.elastic_x + f.viscous_x + f.friction_x, fy = f.elastic_y + f.viscous_y + f.friction_y;
@@ -324,45 +324,45 @@ TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects
       held_power -= g->inverse_inertia[i] == 0 ? f.torque * omega : 0;
   }
   if (effects & TAL_EFFECT_FRICTION)
-    g->friction_work[i] += dt * friction_power;
+    g->friction_work[i] += credit * friction_power;
   if (effects & TAL_EFFECT_DAMPING)
-    g->damping_work[i] += dt * (f.viscous_x * vx + f.viscous_y * vy);
+    g->damping_work[i] += credit * (f.viscous_x * vx + f.viscous_y * vy);
   if (effects & TAL_EFFECT_BOUNDARY)
-    g->boundary_work[i] += dt * (g->bx[i] * vx + g->by[i] * vy);
+    g->boundary_work[i] += credit * (g->bx[i] * vx + g->by[i] * vy);
   if (effects & TAL_EFFECT_HELD) {
     held_power -= g->inverse_mass[i] == 0 ? fx * vx + fy * vy : 0;
-    g->held_work[i] += dt * held_power;
+    g->held_work[i] += credit * held_power;
   }
 }
 
-TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, unsigned effects) {
+TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, double credit, unsigned effects) {
   for (size_t i = start; i < end; i++)
-    finish_grain(sim, i, dt, effects);
+    finish_grain(sim, i, dt, credit, effects);
 }
 
 // A biaxial test with either friction or none; the rest by the run-time mask.
-static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt) {
+static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt, double credit) {
   const unsigned biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_WALLS | TAL_EFFECT_BOUNDARY;
   const unsigned kinds = TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY |
                          TAL_EFFECT_BOUNDARY | TAL_EFFECT_WALLS | TAL_EFFECT_HELD;
   switch (sim->effects & kinds) {
   case biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN:
-    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, credit, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
     break;
   case biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN:
-    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, credit, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
     break;
   case biaxial:
-    finish_chunk(sim, start, end, dt, biaxial);
+    finish_chunk(sim, start, end, dt, credit, biaxial);
     break;
   default:
-    finish_chunk(sim, start, end, dt, sim->effects & kinds);
+    finish_chunk(sim, start, end, dt, credit, sim->effects & kinds);
   }
 }
 
-void tal_forces_finish_step(tal_sim *sim, double dt) {
+void tal_forces_finish_step(tal_sim *sim, double dt, double credit) {
   const size_t count = sim->grains.count, chunks = (count + CHUNK - 1) / CHUNK;
 #pragma omp parallel for schedule(static) if (chunks > 1)
   for (size_t k = 0; k < chunks; k++)
-    finish_variant(sim, k * CHUNK, (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count, dt);
+    finish_variant(sim, k * CHUNK, (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count, dt, credit);
 }

@@ -30,7 +30,8 @@ tal_resultant tal_forces_gather_normal(const tal_sim *sim, size_t grain);
 // Resultants of every grain into rx, ry, rtorque from the slots as they stand (boundary forces added, gravity not).
 void tal_forces_resultants(tal_sim *sim);
 // Gather, boundary forces and gravity, then the second half kick and the ledger: velocities become those of the end of
-// the step (integrate_verlet.c explains the order). dt [s].
-void tal_forces_finish_step(tal_sim *sim, double dt);
+// the step (integrate_verlet.c explains the order). dt [s]; credit [s]: mean of this and the next step, over which the
+// forces of this instant act.
+void tal_forces_finish_step(tal_sim *sim, double dt, double credit);
 
 #endif

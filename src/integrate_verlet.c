@@ -50,14 +50,18 @@ void tal_integrate_drift(tal_sim *sim, double dt) {
     sim->boundary->apply(sim);
 }
 
-static void advance(tal_sim *sim) {
-  tal_integrate_drift(sim, sim->dt);
-  tal_forces_sweep(sim, sim->dt);
-  tal_forces_finish_step(sim, sim->dt);
+void tal_integrate_finish(tal_sim *sim) {
+  tal_forces_finish_step(sim, sim->dt, 0.5 * (sim->dt + sim->dt_next));
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
 }
 
+void tal_integrate_verlet_step(tal_sim *sim) {
+  tal_integrate_drift(sim, sim->dt);
+  tal_forces_sweep(sim, sim->dt);
+  tal_integrate_finish(sim);
+}
+
 const tal_integrator tal_verlet = {.name = "verlet",
                                    .help = "velocity Verlet, second order, velocities synchronised for the laws",
-                                   .advance = advance};
+                                   .advance = tal_integrate_verlet_step};

@@ -132,7 +132,8 @@ struct tal_sim {
   const tal_boundary *boundary; // what presses the loop now, NULL: nothing
   bool boundary_moved;          // the boundary acts on other grains than at the last evaluation
   double friction;              // [-] of grain-grain contacts now (a stage may change it)
-  double dt;                    // [s] of the current stage
+  double dt;                    // [s] of the step being taken; between two steps: of the coming one
+  double dt_next;               // [s] of the step after the one being taken
   unsigned effects;             // mask of effects.h that the hot loop pays for
   double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
 };
