@@ -44,7 +44,7 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test run-tests short asan tsan bench format format-check install clean deps check-deps
+.PHONY: all demo test build-tests run-tests short asan tsan bench format format-check install clean deps check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -82,6 +82,7 @@ demo: deps
 	@sh experiments/biaxial/demo.sh $(OUT)/talus
 test: deps
 	@$(MAKE) --no-print-directory $(JOBS) run-tests
+build-tests: $(OUT)/talus $(TESTS) $(BENCHES)
 run-tests: $(OUT)/talus $(TESTS)
 	@TALUS=$(OUT)/talus sh tests/run.sh $(TESTS)
 asan:
@@ -92,7 +93,8 @@ tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
-	@for e in experiments/*/run.sh; do echo "$$e --short"; TALUS=$(abspath $(OUT)/talus) sh $$e --short || exit 1; done
+	@for e in experiments/*/run.sh; do echo "$$e --short"; \
+	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)
 	@for b in $^; do $$b || exit 1; done
 
@@ -115,13 +117,14 @@ Libs: -L$${libdir} -ltalus
 Libs.private: -fopenmp $(PRIVATE)
 Cflags: -I$${includedir}/talus
 endef
+install: export PC := $(PC)
 install: to := $(DESTDIR)$(PREFIX)
 install: all
 	install -d $(to)/bin $(to)/lib/pkgconfig $(to)/include/talus
 	install $(OUT)/talus $(to)/bin
 	install -m 644 $(OUT)/libtalus.a $(OUT)/libtalus.so $(to)/lib
 	install -m 644 $(HEADERS) $(to)/include/talus
-	$(file > $(to)/lib/pkgconfig/talus.pc,$(PC))
-	$(if $(DESTDIR),,-ldconfig)
+	@echo "$$PC" > $(to)/lib/pkgconfig/talus.pc
+	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true
 clean:
 	rm -rf $(BUILD) $(BUILD)-debug $(BUILD)-asan $(BUILD)-tsan

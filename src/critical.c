@@ -19,17 +19,20 @@ double tal_critical_step_pair(double stiffness, double damping, double reduced_m
   return limit(stiffness / reduced_mass, damping / reduced_mass);
 }
 
-// Tangent stiffness (the tangential spring with it, turned into translation) and damping of a touching slot.
+// Tangent stiffness and damping of a touching slot.
 static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double *stiffness, double *damping) {
   double root = sqrt(s->overlap[c]);
   *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
   *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
-  if ((sim->effects & TAL_EFFECT_SPRING) && !(sim->effects & TAL_EFFECT_IMPLICIT)) {
-    const tal_grains *g = &sim->grains;
-    int32_t i = s->i[c];
-    double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;
-    *stiffness += turning * sim->constants.tangential_ratio * *stiffness;
-  }
+}
+
+// How much stiffer than the normal spring the tangential one is to grain i, turning included; at least 1.
+static double sideways(const tal_sim *sim, int32_t i) {
+  const tal_grains *g = &sim->grains;
+  if (!(sim->effects & TAL_EFFECT_SPRING) || (sim->effects & TAL_EFFECT_IMPLICIT))
+    return 1;
+  double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;
+  return fmax(1, sim->constants.tangential_ratio * turning);
 }
 
 static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, double (*sum)[2]) {
@@ -37,13 +40,14 @@ static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, dou
     if (s->overlap[c] <= 0)
       continue;
     double k, d;
+    int32_t i = s->i[c], j = s->j[c];
     slot_slopes(sim, s, c, &k, &d);
-    sum[s->i[c]][0] += k;
-    sum[s->i[c]][1] += d;
+    sum[i][0] += k * sideways(sim, i);
+    sum[i][1] += d;
     if (!pairs)
       continue;
-    sum[s->j[c]][0] += k;
-    sum[s->j[c]][1] += d;
+    sum[j][0] += k * sideways(sim, j);
+    sum[j][1] += d;
   }
 }
 
@@ -131,6 +135,8 @@ double tal_friction_step(const tal_sim *sim, double pressure) {
   double cap = sim->scene->material.friction * pressure * 2 * k->mean_radius * k->thickness;
   if (strcmp(sim->scene->contact.tangential, "regularised") != 0 || !(cap > 0))
     return (double)INFINITY;
-  // two free disks: the slip answers a tangential force with 2 (1/m + R^2/I) = 6/m
-  return k->vR * k->mean_mass / (6 * cap);
+  // two free grains: the slip answers a tangential force with 2 (1/m + R^2/I)
+  double turning = sim->scene->grains.shape == TAL_DISK ? 2 : 2.5;
+  double answer = 2 * (1 + (sim->scene->rotation ? turning : 0));
+  return k->vR * k->mean_mass / (answer * cap);
 }

@@ -89,7 +89,7 @@ void tal_energy_credit(tal_sim *sim, double weight) {
 static power grain_works(const tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   power sum = {0};
-  double half = sim->stage ? 0.5 * sim->dt : 0;
+  double half = sim->stage && !sim->run.stage_done ? 0.5 * sim->dt : 0;
   for (size_t i = 0; i < g->count; i++) {
     power p = grain_power(sim, i);
     sum.friction += g->friction_work[i] - half * p.friction;

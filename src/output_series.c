@@ -125,7 +125,7 @@ static void put_number(FILE *stream, char before, double value) {
   if (isnan(value)) {
     fputs("nan", stream);
   } else {
-    fprintf(stream, "%.17g", value);
+    fprintf(stream, "%.17g", value + 0.0); // -0 as 0
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include "critical.h"
 #include "effects.h"
+#include "forces.h"
 #include "integrate.h"
 #include "output.h"
 #include "progress.h"
@@ -84,8 +85,16 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
+// Nothing that has gone bad is written.
+static tal_status inspect(job *this, tal_error *err) {
+  tal_forces_expand(this->sim);
+  return tal_step_inspect(this->sim, err);
+}
+
 static tal_status write_checkpoint(job *this, tal_error *err) {
-  tal_status status = tal_output_checkpoint(this->output, this->sim, err);
+  tal_status status = inspect(this, err);
+  if (status == TAL_OK)
+    status = tal_output_checkpoint(this->output, this->sim, err);
   if (status)
     return status;
   this->checkpoint = true;
@@ -123,9 +132,9 @@ static tal_status write_row(job *this, bool fields, tal_error *err) {
 // Everything that looks at the run between two steps.
 static tal_status observe(job *this, tal_error *err) {
   const tal_scene_output *plan = &this->scene->output;
-  bool fields = due(this->sim, plan->fields_every);
-  tal_status status = TAL_OK;
-  if (due(this->sim, plan->series_every) || fields)
+  bool fields = due(this->sim, plan->fields_every), row = fields || due(this->sim, plan->series_every);
+  tal_status status = row ? inspect(this, err) : TAL_OK;
+  if (status == TAL_OK && row)
     status = write_row(this, fields, err);
   if (status)
     return status;

@@ -261,7 +261,7 @@ static const tal_key stage_keys[] = {
     {KEY("rate", REAL), .unit = "1/s", ONLY("kind", "compress"), .required = true, POSITIVE, AT(tal_scene_stage, rate),
      .help = "rate of the engineering axial strain"},
     {KEY("strain", REAL), ONLY("kind", "compress"), .required = true, INSIDE(0, 1), AT(tal_scene_stage, strain),
-     .help = "engineering axial strain at the end of the stage"},
+     .help = "engineering axial strain that the stage adds"},
     {KEY("integrator", GROUP), .optional = true, .note = "the scene's", AT(tal_scene_stage, integrator),
      .keys = stage_integrator_keys, .help = "own settings of this stage"},
     {.name = NULL}};
@@ -270,7 +270,7 @@ static const tal_key output_keys[] = {
     {KEY("series_every", REAL), .unit = "s", .fallback = "0.05", NOT_NEGATIVE, .infinite = true,
      AT(tal_scene_output, series_every), .help = "between rows of series.csv; at or below dt: every step"},
     {KEY("fields_every", REAL), .unit = "s", .fallback = ".inf", POSITIVE, .infinite = true,
-     AT(tal_scene_output, fields_every), .help = "between field files; .inf: first and last state only"},
+     AT(tal_scene_output, fields_every), .help = "between field files; .inf: first state and ends of stages only"},
     {KEY("checkpoint_every", REAL), .unit = "s", .fallback = "2.0", POSITIVE, .infinite = true,
      AT(tal_scene_output, checkpoint_every), .help = "between checkpoints, in simulated time"},
     {KEY("tracks", WHOLES), .fallback = "[]", FROM(0, 1e8), COUNTED(tal_scene_output, tracks, track_count),

@@ -282,6 +282,7 @@ void tal_sim_restored(tal_sim *sim) {
       sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");
   }
   tal_step_effects(sim);
+  sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
   tal_neighbours_rebuild(sim);
   tal_sim_observe(sim); // overlaps: a wall that vanishes in the next step takes its contacts' energy along
 }

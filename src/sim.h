@@ -16,7 +16,7 @@
 #define TAL_RUN_FIELDS(X)                                                                                              \
   X(int64_t, step, "1", "small steps taken since the start")                                                           \
   X(double, time, "s", "simulated time")                                                                               \
-  X(int64_t, stage, "1", "index of the current stage; the number of stages when all are done")                         \
+  X(int64_t, stage, "1", "index of the current or last stage")                                                         \
   X(int64_t, stage_step, "1", "steps taken in this stage")                                                             \
   X(double, stage_start, "s", "time at which this stage began")                                                        \
   X(int64_t, bedding, "1", "1 while the plates bed the uneven ends of a packing")                                      \

@@ -24,7 +24,8 @@ static void open_window(tal_sim *sim) {
 
 static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   (void)err;
-  tal_plates_ensure(sim);
+  if (isnan(sim->scene->pack.cut_radius)) // a cut assembly is pressed all around
+    tal_plates_ensure(sim);
   sim->boundary = &tal_boundary_pressure;
   sim->run.bedding = 1;
   sim->run.pressure = 0;
@@ -37,8 +38,8 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
 static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   double elapsed = sim->run.time + sim->dt - sim->run.stage_start;
   sim->run.pressure = plan->pressure * fmin(1, elapsed / plan->ramp);
-  double speed_limit = 0.1 * tal_plates_distance(sim) / plan->ramp;
-  tal_plates_servo(sim, sim->run.pressure, speed_limit);
+  if (tal_walls_plate(&sim->walls, +1))
+    tal_plates_servo(sim, sim->run.pressure, 0.1 * tal_plates_distance(sim) / plan->ramp);
 }
 
 // Mean of m |dv| / window over the free grains, over the mean contact force of this instant.

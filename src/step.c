@@ -126,13 +126,19 @@ static tal_status check_step(const tal_sim *sim, tal_error *err) {
                   plan->kind);
 }
 
+// Asks the stage whether it is over; the last instant of a stage counts half in the ledger.
+static tal_status look_for_end(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
+  tal_status status = sim->stage->after_step(sim, plan, err);
+  if (status == TAL_OK && sim->run.stage_done) {
+    tal_sim_driving(sim);
+    tal_energy_credit(sim, -0.5 * sim->dt);
+  }
+  return status;
+}
+
 tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
-  if (sim->stage) { // the instant between two stages counts half in each
-    tal_sim_observe(sim);
-    tal_energy_credit(sim, -0.5 * sim->dt);
-  }
   sim->stage = tal_stage_find(plan->kind);
   run->stage_step = 0;
   sim->dt = tal_step_length(sim, 0);
@@ -157,7 +163,7 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
     return status;
   if ((status = check_step(sim, err)))
     return status;
-  return sim->stage->after_step(sim, plan, err);
+  return look_for_end(sim, plan, err);
 }
 
 bool tal_step_keeps_graph(const tal_sim *sim) {
@@ -271,5 +277,5 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   }
   if (tal_step_keeps_graph(sim) && refresh_due(sim) && (status = tal_step_refresh(sim, err)))
     return status;
-  return sim->stage->after_step(sim, plan, err);
+  return look_for_end(sim, plan, err);
 }

@@ -45,6 +45,7 @@ tal_wall_point tal_wall_nearest(const tal_wall *wall, double x, double y) {
   }
   double ex = along > 0 ? x - wall->x1 : ax, ey = along > 0 ? y - wall->y1 : ay;
   double distance = sqrt(ex * ex + ey * ey);
-  if (distance == 0) return (tal_wall_point){-ty, tx, 0}; // on the end itself: any direction
+  if (distance == 0)
+    return (tal_wall_point){-ty, tx, 0}; // on the end itself: any direction
   return (tal_wall_point){ex / distance, ey / distance, distance};
 }

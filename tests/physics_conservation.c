@@ -1,10 +1,11 @@
 // Conservation and symmetry of the motion: momentum, angular momentum, the motion seen from a turned, mirrored or
 // moving frame, and backwards in time.
-#include <cmocka.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+
+#include <cmocka.h>
 
 #include "effects.h"
 #include "engine.h"
@@ -117,7 +118,7 @@ static void assert_mapped(const engine *e, const engine *f, double xx, double xy
 // The cloud in a box of four walls, one of them moving, with gravity, all put through the linear map.
 static engine *start_mapped(const cloud_grain *g, int count, const char *law, const double m[4], double spin) {
   static const double walls[4][6] = {
-      {-14, -13, 14, -13, 0, 0}, {14, -13, 14, 13, -2, 0.25}, {14, 13, -14, 13, 0, 0}, {-14, 13, -14, -13, 0, 0}};
+      {-14, -13, 14, -13, 0.25, 3}, {14, -13, 14, 13, -3, 0.5}, {14, 13, -14, 13, 0, 0}, {-14, 13, -14, -13, 0, 0}};
   char *text = NULL;
   size_t size = 0;
   FILE *to = open_memstream(&text, &size);
@@ -156,7 +157,7 @@ static void turned_and_mirrored_frames(void **state) {
         assert_mapped(e, f, maps[m][0], maps[m][1], maps[m][2], maps[m][3], spins[m]);
       }
       tal_row row = engine_row(e);
-      assert_true(row.work_walls != 0);
+      assert_true(row.work_walls > 1000);
       engine_end(e);
       engine_end(f);
     }
@@ -174,7 +175,7 @@ static void mirror_symmetric_set_up(void **state) {
     snprintf(rest, sizeof rest, "walls: [{from: [-50, -1], to: [50, -1]}]\ngravity: [0, -10]\n%s", laws[k]);
     engine *e = start_cloud(pile, 3, rest);
     const tal_grains *g = &e->sim->grains;
-    double apart = 0, least = INFINITY;
+    double apart = 0, least = (double)INFINITY;
     for (int s = 0; s < 3000; s++) {
       engine_step(e);
       assert_true(g->x[0] == -g->x[1] && g->y[0] == g->y[1] && g->vx[0] == -g->vx[1] && g->vy[0] == g->vy[1]);
@@ -183,7 +184,7 @@ static void mirror_symmetric_set_up(void **state) {
       apart = fmax(apart, g->x[1]);
       least = fmin(least, g->y[2]);
     }
-    assert_true(apart > 1.5 && least < 2); // driven apart by the third
+    assert_true(apart > 1.1 && least < 1.5); // driven apart by the third
     engine_end(e);
   }
 }
@@ -192,26 +193,21 @@ static void mirror_symmetric_set_up(void **state) {
 // of round grains blow that up by a factor each (about 2 path / radius), so a short run of few collisions is compared.
 static void moving_frame(void **state) {
   (void)state;
-  cloud_grain *g = cloud(6, 0);
+  const double u = 3, v = -5;
+  cloud_grain *g = cloud(6, 0), *moving = cloud(6, 0);
+  for (int i = 0; i < 36; i++) {
+    moving[i].vx += u;
+    moving[i].vy += v;
+  }
   for (int k = 0; k < LAWS; k++) {
     engine *e = start_cloud(g, 36, laws[k]);
-    const double u = 3, v = -5;
-    for (int i = 0; i < 36; i++) {
-      g[i].vx += u;
-      g[i].vy += v;
-    }
-    engine *f = start_cloud(g, 36, laws[k]);
-    for (int i = 0; i < 36; i++) {
-      g[i].vx -= u;
-      g[i].vy -= v;
-    }
-    engine_steps(e, 1200);
-    engine_steps(f, 1200);
+    engine *f = start_cloud(moving, 36, laws[k]);
+    engine_steps(e, 800);
+    engine_steps(f, 800);
     double t = e->sim->run.time, worst = 0;
     for (size_t i = 0; i < 36; i++)
       worst = fmax(worst, hypot(f->sim->grains.x[i] - u * t - e->sim->grains.x[i],
                                 f->sim->grains.y[i] - v * t - e->sim->grains.y[i]));
-    printf("%d %g\n", k, worst);
     if (!(worst < 1e-9)) // 1e5 times the round-off of a coordinate
       fail_msg("law %d: %.3g apart", k, worst);
     assert_true(engine_row(e).overlap_max > 0);
@@ -219,6 +215,7 @@ static void moving_frame(void **state) {
     engine_end(f);
   }
   free(g);
+  free(moving);
 }
 
 // ROUND: velocity Verlet with forces of position alone runs backwards to where it came from.

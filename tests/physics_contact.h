@@ -53,52 +53,55 @@ static inline void contact_open(physics *p, const ode_contact *k, double lead, d
   contact_law_text(law, k);
   physics_open(p,
                "grains: {list: [%s%s%s]}\n%s%s"
-               "integrator: {dt: %.17g}\nlimits: {overlap: 1}\nstages: [{kind: free, duration: 1e9}]\n",
+               "integrator: {dt: %.17g}\nlimits: {overlap: 1}\nstages: [{kind: free, duration: %.17g}]\n",
                i, k->plane ? "" : ", ", j, law,
-               k->plane ? "walls: [{from: [-1e3, 0], to: [1e3, 0], young: .inf}]\n" : "", dt);
+               k->plane ? "walls: [{from: [-1e3, 0], to: [1e3, 0], young: .inf}]\n" : "", dt, 2e6 * dt);
 }
 
-// Normal force [N] on the first grain and overlap [m], both from the grains' own places and forces.
-static inline void contact_normal(const physics *p, const ode_contact *k, double *fn, double *overlap) {
+typedef struct contact_now {
+  double overlap, approach; // [m, m/s]
+  double load;              // K d + C d': the normal force but for a factor, falls through zero where the contact ends
+} contact_now;
+
+// From places and velocities alone.
+static inline contact_now contact_state(const physics *p, const ode_contact *k) {
   const tal_grains *g = &p->sim->grains;
-  double nx = 0, ny = 1, distance = g->y[0];
+  contact_now now = {.overlap = k->i.r - g->y[0], .approach = -g->vy[0]};
   if (!k->plane) {
-    distance = hypot(g->x[0] - g->x[1], g->y[0] - g->y[1]);
-    nx = (g->x[0] - g->x[1]) / distance;
-    ny = (g->y[0] - g->y[1]) / distance;
+    double dx = g->x[0] - g->x[1], dy = g->y[0] - g->y[1], distance = hypot(dx, dy);
+    now.overlap = k->i.r + k->j.r - distance;
+    now.approach = -(dx * (g->vx[0] - g->vx[1]) + dy * (g->vy[0] - g->vy[1])) / distance;
   }
-  *fn = g->fx[0] * nx + g->fy[0] * ny;
-  *overlap = k->i.r + (k->plane ? 0 : k->j.r) - distance;
+  now.load = k->K * now.overlap + k->C * now.approach;
+  return now;
 }
 
-// Runs until the normal force has come and gone. The duration is measured from the instant that the contact describes;
-// its end is found by linear interpolation of the overlap, or extrapolation of the force where it ends clipped.
+static inline void contact_motion(const physics *p, ode_result *result) {
+  const tal_grains *g = &p->sim->grains;
+  for (size_t b = 0; b < g->count; b++) {
+    result->vx[b] = g->vx[b];
+    result->vy[b] = g->vy[b];
+    result->w[b] = g->omega[b];
+  }
+}
+
+// Runs until the contact has come and gone. The duration is measured from the instant that the contact describes; its
+// end is found by linear interpolation of the load.
 static inline ode_result contact_run(const ode_contact *k, double lead, double dt) {
   physics p;
   ode_result result = {0};
-  double fn = 0, overlap, before, deep = 0;
   contact_open(&p, k, lead, dt);
-  contact_normal(&p, k, &fn, &overlap);
-  for (int64_t steps = 0;; steps++) {
-    before = fn;
-    deep = overlap;
+  contact_now before, now = contact_state(&p, k);
+  do {
+    before = now;
     physics_step(&p);
-    contact_normal(&p, k, &fn, &overlap);
-    result.overlap = fmax(result.overlap, overlap);
-    if (fn <= 0 && before > 0)
-      break;
-    result.stuck_share = before - fn; // last change of the force, for the extrapolation
-    assert_true(steps < 10000000);
-  }
-  double last = p.sim->run.time - dt;
-  result.time = last - lead + dt * (overlap < 0 ? deep / (deep - overlap) : before / result.stuck_share);
-  result.stuck_share = 0;
-  const tal_grains *g = &p.sim->grains;
-  for (size_t b = 0; b < g->count; b++) {
-    result.vx[b] = g->vx[b];
-    result.vy[b] = g->vy[b];
-    result.w[b] = g->omega[b];
-  }
+    now = contact_state(&p, k);
+    result.overlap = fmax(result.overlap, now.overlap);
+    assert_false(tal_sim_done(p.sim));
+  } while (now.load > 0 || before.overlap <= 0);
+  result.overlap_last = now.overlap;
+  result.time = p.sim->run.time - dt - lead + dt * before.load / (before.load - now.load);
+  contact_motion(&p, &result);
   physics_close(&p);
   return result;
 }

@@ -64,17 +64,17 @@ static void test_elastic_linear(void **state) {
   }
 }
 
-// Reference: speed ratio, largest overlap and duration of damped Hertz impacts, four decades of speed and three and a
-// half of damping T: from e = 0.999 to below 0.02.
+// Reference: speed ratio, largest overlap and duration of damped Hertz impacts, four decades of speed and more
+// than four of damping T: from e = 0.998 to below 0.02.
 static void test_damped_hertz(void **state) {
   (void)state;
   double least = 1, most = 0;
   for (double speed = 1e-3; speed < 20; speed *= 10) {
-    for (double damping = 1e-8; damping < 1e-4; damping *= sqrt(10)) {
+    for (double damping = 1e-8; damping < 1e-3; damping *= 5) {
       ode_contact k = head_on(true, speed < 5e-2, speed);
       k.C = damping * k.K;
-      double duration = elastic_duration(&k, speed), dt = duration / 12000;
-      ode_result exact = ode_solve(&k, duration, INFINITY), r = contact_run(&k, 3.7 * dt, dt);
+      double duration = elastic_duration(&k, speed), dt = duration / (damping > 1e-5 ? 30000 : 12000);
+      ode_result exact = ode_solve(&k, duration, HUGE_VAL), r = contact_run(&k, 3.7 * dt, dt);
       double e = leaving_speed(&k, &exact) / speed;
       assert_near(leaving_speed(&k, &r), speed * e, 1e-6, speed);
       assert_near(r.overlap, exact.overlap, 1e-6, k.length);
@@ -95,13 +95,12 @@ static double linear_restitution_run(const ode_contact *k, double restitution, d
   physics p;
   physics_open(&p,
                "grains: {list: [%s%s%s]}\ncontact: {normal: linear, stiffness: %.17g, restitution: %.17g}\n"
-               "%sintegrator: {dt: %.17g}\nstages: [{kind: free, duration: 1e9}]\n",
+               "%sintegrator: {dt: %.17g}\nstages: [{kind: free, duration: %.17g}]\n",
                i, k->plane ? "" : ", ", j, k->K, restitution,
-               k->plane ? "walls: [{from: [-1e3, 0], to: [1e3, 0]}]\n" : "", dt);
-  double fn = 1, overlap;
-  for (int steps = 0; steps < 1000000 && !(fn <= 0); steps++) {
+               k->plane ? "walls: [{from: [-1e3, 0], to: [1e3, 0]}]\n" : "", dt, 2e6 * dt);
+  while (contact_state(&p, k).load > 0) { // without damping in k: until the two have parted
     physics_step(&p);
-    contact_normal(&p, k, &fn, &overlap);
+    assert_false(tal_sim_done(p.sim));
   }
   const tal_grains *g = &p.sim->grains;
   double ratio = k->plane ? -g->vy[0] / k->i.vy : (g->vx[1] - g->vx[0]) / (k->i.vx - k->j.vx);
@@ -136,7 +135,9 @@ static void test_linear_contact(void **state) {
     k.overlap = 1e-12 * k.length;
     k.j.x -= k.overlap;
     double duration = 2 * angle / (w * side), overlap = k.length * exp(-z * angle / side), dt = duration / 40000.4;
-    ode_result exact = ode_solve(&k, duration, INFINITY), r = contact_run(&k, 0, dt);
+    ode_result r = contact_run(&k, 0, dt);
+    k.length = overlap;
+    ode_result exact = ode_solve(&k, duration, HUGE_VAL);
     assert_relative(exact.time, duration, 1e-10);
     assert_relative(exact.overlap, overlap, 1e-10);
     assert_near(leaving_speed(&k, &exact), 0.7 * exp(-2 * z * angle / side), 1e-10, 0.7);
@@ -154,7 +155,7 @@ enum { REFINEMENTS = 5, PHASES = 8 };
 // divide the duration: where they did, errors of beginning and end could cancel. *finest: worst error at the finest dt.
 static double impact_order(const ode_contact *k, double duration, int coarsest, double *finest) {
   double dt[REFINEMENTS], error[REFINEMENTS];
-  ode_result exact = ode_solve(k, duration, INFINITY);
+  ode_result exact = ode_solve(k, duration, HUGE_VAL);
   for (int n = 0; n < REFINEMENTS; n++) {
     double sum = 0, worst = 0;
     dt[n] = duration / (ldexp(coarsest, n) + 0.37);
@@ -202,11 +203,11 @@ static void test_linear_jump_vanishes(void **state) {
   ode_contact k = head_on(false, true, 1);
   double duration = elastic_duration(&k, 1), dt = duration / 400000;
   k.C = 0.4 * sqrt(k.K * contact_mass(&k));
-  ode_result exact = ode_solve(&k, duration, INFINITY), r = contact_run(&k, 0.99 * dt, dt);
+  ode_result exact = ode_solve(&k, duration, HUGE_VAL), r = contact_run(&k, 0.99 * dt, dt);
   assert_near(leaving_speed(&k, &r), leaving_speed(&k, &exact), 1e-6, 1);
 }
 
-// Error of place and velocity at a given time, both over their scales.
+// Error of place and velocity of two grains at a given time, over the largest overlap and 1 m/s.
 static double error_at(const ode_contact *k, double time, int steps) {
   physics p;
   ode_result exact = ode_solve(k, time, time);
@@ -214,12 +215,10 @@ static double error_at(const ode_contact *k, double time, int steps) {
   for (int n = 0; n < steps; n++)
     physics_step(&p);
   const tal_grains *g = &p.sim->grains;
-  double fn, overlap, last = exact.overlap_last;
-  contact_normal(&p, k, &fn, &overlap);
-  double speed = leaving_speed(k, &exact);
-  double off = k->plane ? g->vy[0] - speed : g->vx[1] - g->vx[0] - speed;
+  double off = g->vx[1] - g->vx[0] - leaving_speed(k, &exact);
+  double shift = contact_state(&p, k).overlap - exact.overlap_last;
   physics_close(&p);
-  return fmax(fabs(off), fabs(overlap - last) / k->length);
+  return fmax(fabs(off), fabs(shift) / k->length);
 }
 
 // ORDER: within a contact (half-way in to past the turning point) nothing is singular: second order in place and
@@ -314,21 +313,23 @@ static void check_column(const rest *c) {
   double wall = (1 - c->wall_poisson * c->wall_poisson) / c->wall_young, weight = c->mass * c->gravity;
   double k_wall = hertz_stiffness(grain + wall, c->r), k_pair = hertz_stiffness(2 * grain, c->r / 2);
   double d_wall = pow(2 * weight / k_wall, 2.0 / 3), d_pair = pow(weight / k_pair, 2.0 / 3);
-  double w = sqrt(1.5 * k_wall * sqrt(d_wall) / c->mass), dt = 0.05 / w;
+  double w = sqrt(1.5 * k_wall * sqrt(d_wall) / c->mass), dt = 0.01 / w;
   physics p;
+  char wall_young[40];
+  snprintf(wall_young, sizeof wall_young, isinf(c->wall_young) ? ".inf" : "%.17g", c->wall_young);
   physics_open(&p,
                "grains: {list: [{x: 0, y: %.17g, r: %.17g, mass: %.17g}, {x: 0, y: %.17g, r: %.17g, mass: %.17g}]}\n"
                "material: {young: %.17g, poisson: %.17g, density: 1, damping: %.17g}\ngravity: [0, %.17g]\n"
-               "walls: [{from: [-1, 0], to: [1, 0], young: %.17g, poisson: %.17g}]\n"
+               "walls: [{from: [-1, 0], to: [1, 0], young: %s, poisson: %.17g}]\n"
                "integrator: {dt: %.17g}\nstages: [{kind: free, duration: %.17g}]\n",
                c->r - 0.8 * d_wall, c->r, c->mass, 3 * c->r - 0.8 * d_wall - d_pair, c->r, c->mass, c->young,
-               c->poisson, 3 / w, -c->gravity, c->wall_young, c->wall_poisson, dt, 200 / w);
+               c->poisson, 3 / w, -c->gravity, wall_young, c->wall_poisson, dt, 200 / w);
   physics_to_end(&p);
   const tal_grains *g = &p.sim->grains;
-  double round = 8 * 2.2e-16 * c->r; // of the places
+  double round = 100 * 2.2e-16 * c->r; // places stand still once they creep by under half an ulp a step: / (w dt)
   assert_near(c->r - g->y[0], d_wall, 1e-11 + round / d_wall, d_wall);
   assert_near(2 * c->r - (g->y[1] - g->y[0]), d_pair, 1e-11 + 3 * round / d_pair, d_pair);
-  assert_true(fabs(g->vy[0]) < 1e-10 * c->gravity / w);
+  assert_true(fabs(g->vy[0]) * dt < 2.2e-16 * c->r);
   physics_close(&p);
 }
 
@@ -340,7 +341,7 @@ static void test_rest(void **state) {
   for (double gravity = 0.1; gravity < 200; gravity *= 10)
     for (double stiffer = 0.03; stiffer < 50; stiffer *= 10)
       check_column(&(rest){1e8, 0.3, 1e8 * stiffer, 0.1, 1e-3, 1e-5, gravity});
-  check_column(&(rest){1e8, 0.3, INFINITY, 0.3, 1e-3, 1e-5, 9.81});
+  check_column(&(rest){1e8, 0.3, HUGE_VAL, 0.3, 1e-3, 1e-5, 9.81});
 }
 
 int main(void) {

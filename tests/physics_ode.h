@@ -46,7 +46,9 @@ typedef struct ode_result {
 // Variables: displacements since the start, velocities, spins of i then j; then the spring force.
 enum { ODE_UX, ODE_UY, ODE_VX, ODE_VY, ODE_W, ODE_BODY, ODE_FT = 2 * ODE_BODY, ODE_SIZE };
 
-// SLIDES: |ft| at the Coulomb cap (spring); HOLDS: slip is zero and ft what keeps it so (regularised).
+// SLIDES: |ft| at the Coulomb cap (spring). HOLDS: slip is zero and ft what keeps it so (regularised, c >= 10), as long
+// as that takes less than half of mu fn: the slip left out is below vR / 2^c, and free motion would be too stiff to
+// follow.
 typedef enum ode_mode { ODE_FREE, ODE_SLIDES, ODE_HOLDS } ode_mode;
 
 typedef struct ode_run {
@@ -60,6 +62,7 @@ typedef struct ode_state {
   double nx, ny, overlap, approach, slip; // slip: of i against j at the contact point, along t = (-ny, nx)
   double arm_i, arm_j;                    // distance of the contact point from the centres
   double turning;                         // rate at which n turns
+  double spins;                           // sum of the spins of those that turn
   double fn, ft, kt;
 } ode_state;
 
@@ -83,6 +86,7 @@ static inline void ode_geometry(const ode_contact *k, const double *y, ode_state
     s->arm_j = k->j.r - s->overlap / 2;
     s->turning = (s->nx * (i[ODE_VY] - j[ODE_VY]) - s->ny * (i[ODE_VX] - j[ODE_VX])) / distance;
   }
+  s->spins = i[ODE_W] + (k->plane ? 0 : j[ODE_W]);
   // velocities of the two contact points: v + omega x l with l = -arm n for i, +arm n for j
   double ix = i[ODE_VX] + i[ODE_W] * s->arm_i * s->ny, iy = i[ODE_VY] - i[ODE_W] * s->arm_i * s->nx;
   double jx = 0, jy = 0;
@@ -111,12 +115,12 @@ static inline void ode_accelerate(const ode_contact *k, const ode_state *s, doub
 }
 
 // Rate of the slip for these accelerations.
-static inline double ode_slip_rate(const ode_contact *k, const double *y, const ode_state *s, const double *a) {
+static inline double ode_slip_rate(const ode_contact *k, const ode_state *s, const double *a) {
   double shrinking = k->plane ? s->approach : s->approach / 2; // of the arms
   double rate = -(a[0] - a[3]) * s->ny + (a[1] - a[4]) * s->nx;
   rate += s->approach * s->turning; // t turns by -n
   rate -= a[2] * s->arm_i + a[5] * s->arm_j;
-  return rate + (y[ODE_W] + (k->plane ? 0 : y[ODE_BODY + ODE_W])) * shrinking;
+  return rate + s->spins * shrinking;
 }
 
 static inline double ode_normal(const ode_contact *k, double overlap, double approach) {
@@ -125,12 +129,12 @@ static inline double ode_normal(const ode_contact *k, double overlap, double app
 }
 
 // The tangential force that keeps the slip at zero; the slip rate is linear in it.
-static inline double ode_holding_force(const ode_contact *k, const double *y, const ode_state *s) {
+static inline double ode_holding_force(const ode_contact *k, const ode_state *s) {
   double a[6], scale = s->fn;
   ode_accelerate(k, s, s->fn, 0, a);
-  double without = ode_slip_rate(k, y, s, a);
+  double without = ode_slip_rate(k, s, a);
   ode_accelerate(k, s, s->fn, scale, a);
-  double with = ode_slip_rate(k, y, s, a);
+  double with = ode_slip_rate(k, s, a);
   return with == without ? 0 : -scale * without / (with - without);
 }
 
@@ -145,7 +149,7 @@ static inline void ode_observe(const ode_run *run, const double *y, ode_state *s
   if (k->kind == ODE_REGULARISED) {
     s->ft = -copysign(cap * pow(fabs(s->slip) / k->vR, 1 / k->c), s->slip);
     if (run->mode == ODE_HOLDS)
-      s->ft = ode_holding_force(k, y, s);
+      s->ft = ode_holding_force(k, s);
   }
   if (k->kind == ODE_SPRING)
     s->ft = run->mode == ODE_SLIDES ? run->sign * cap : y[ODE_FT];
@@ -202,8 +206,13 @@ static inline ode_event ode_look(const ode_run *run, const double *before, const
   if (k->kind == ODE_SPRING && run->mode == ODE_SLIDES &&
       run->sign * ode_spring_rate(k, &now) < ode_cap_rate(run, &now))
     return ODE_SLIP_ENDS;
-  if (k->kind == ODE_REGULARISED && run->mode == ODE_FREE && was.slip * now.slip < 0)
-    return ODE_SLIP_ENDS;
+  if (k->kind == ODE_REGULARISED && k->c >= 10) {
+    bool holds = fabs(ode_holding_force(k, &now)) < 0.5 * k->mu * now.fn;
+    if (run->mode == ODE_FREE && was.slip * now.slip < 0 && holds)
+      return ODE_SLIP_ENDS;
+    if (run->mode == ODE_HOLDS && !holds)
+      return ODE_SLIP_BEGINS;
+  }
   return was.approach > 0 && now.approach <= 0 ? ODE_TURNS : ODE_NOTHING;
 }
 
@@ -212,14 +221,14 @@ static inline void ode_switch(ode_run *run, ode_event event, double *y) {
   if (event == ODE_TURNS)
     return;
   ode_observe(run, y, &s);
-  if (event == ODE_SLIP_BEGINS) {
+  if (run->contact->kind == ODE_REGULARISED) {
+    run->mode = event == ODE_SLIP_ENDS ? ODE_HOLDS : ODE_FREE;
+  } else if (event == ODE_SLIP_BEGINS) {
     run->mode = ODE_SLIDES;
     run->sign = y[ODE_FT] > 0 ? 1 : -1;
-  } else if (run->contact->kind == ODE_SPRING) {
+  } else {
     run->mode = ODE_FREE;
     y[ODE_FT] = s.ft;
-  } else {
-    run->mode = ODE_HOLDS;
   }
 }
 
@@ -243,7 +252,7 @@ static inline void ode_scales(const ode_contact *k, double time, double *scale) 
   scale[ODE_FT] = ode_normal(k, k->length, 0);
 }
 
-// `time`: order of magnitude of the contact's duration [s]; `until`: stops there, INFINITY at the end of contact.
+// `time`: order of magnitude of the contact's duration [s]; `until`: stops there, HUGE_VAL at the end of contact.
 static inline ode_result ode_solve(const ode_contact *k, double time, double until) {
   ode_run run = {k, ODE_FREE, 0};
   gsl_odeiv2_system system = {ode_rates, NULL, ODE_SIZE, &run};
@@ -261,7 +270,7 @@ static inline ode_result ode_solve(const ode_contact *k, double time, double unt
     int status = gsl_odeiv2_evolve_apply(evolve, control, step, &system, &t, fmin(limit, until), &h, y);
     assert(status == GSL_SUCCESS);
     (void)status;
-    limit = INFINITY;
+    limit = HUGE_VAL;
     ode_event event = ode_look(&run, before, y);
     if (event != ODE_NOTHING && t - from > 1e-14 * time) {
       h = 0.5 * (t - from);

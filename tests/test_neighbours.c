@@ -1,12 +1,14 @@
 // The neighbour list: complete at every step against a search over all pairs and walls, in the right order, and without
 // any influence on the motion: three skins give the same bits.
+#include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
-#include <setjmp.h>
 #include <stdint.h>
+
 #include <cmocka.h>
 
 #include "engine.h"
+#include "forces.h"
 #include <omp.h>
 
 static const double skins[] = {0.005, 0.02, 0.3};
@@ -122,6 +124,7 @@ static void run_all(writer *write, int steps, size_t least_pairs, size_t least_w
   for (int s = 0; s < steps && !tal_sim_done(e[0]->sim); s++)
     for (int k = 0; k < SKINS; k++) {
       engine_step(e[k]);
+      tal_forces_expand(e[k]->sim);
       pairs += check_pairs(e[k]->sim);
       walls += check_walls(e[k]->sim);
       check_incidences(e[k]->sim);
@@ -175,13 +178,14 @@ static void ratio_20(FILE *to) {
 static void moving_walls(FILE *to) {
   put_grains(to, 8, 2.4, 0.4, 1.0, 2);
   put_box(to, 21.6);
-  fprintf(to, "  - {from: [-9, 1], to: [-2, 1], velocity: [25, 0.5]}\n"
-              "  - {from: [30, 2], to: [30, 15], velocity: [-16, 0]}\n"
-              "  - {from: [4, -5], to: [9, -3], velocity: [0, 10], friction: 0}\n"
-              "  - {from: [10.8, 0], to: [10.8, 21.6], until_time: 0.3}\n"
-              "  - {from: [0, 4.8], to: [21.6, 4.8], from_time: 0.5, until_time: 0.7, velocity: [0, 1]}\n"
-              "material: {density: 1, friction: 0.4}\ncontact: {normal: linear, stiffness: 2e4, damping: 20, vR: 1e-3}\n"
-              "limits: {overlap: 1}\nintegrator: {dt: 1e-3}\nstages: [{kind: free, duration: 1.2}]\n");
+  fprintf(to,
+          "  - {from: [-9, 1], to: [-2, 1], velocity: [25, 0.5]}\n"
+          "  - {from: [30, 2], to: [30, 15], velocity: [-16, 0]}\n"
+          "  - {from: [4, -5], to: [9, -3], velocity: [0, 10], friction: 0}\n"
+          "  - {from: [10.8, 0], to: [10.8, 21.6], until_time: 0.3}\n"
+          "  - {from: [0, 4.8], to: [21.6, 4.8], from_time: 0.5, until_time: 0.7, velocity: [0, 1]}\n"
+          "material: {density: 1, friction: 0.4}\ncontact: {normal: linear, stiffness: 2e4, damping: 20, vR: 1e-3}\n"
+          "limits: {overlap: 1}\nintegrator: {dt: 1e-3}\nstages: [{kind: free, duration: 1.2}]\n");
 }
 
 static void biaxial(FILE *to) {
