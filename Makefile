@@ -102,7 +102,7 @@ FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] test
 format:
 	clang-format -i $(FORMATTED)
 format-check:
-	clang-format --dry-run -Werror $(FORMATTED)
+	@clang-format --dry-run -Werror $(FORMATTED)
 
 define PC
 prefix=$(PREFIX)

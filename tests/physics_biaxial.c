@@ -17,14 +17,14 @@ static const double pressure = 100e3, thickness = 1.5e-3;
 static engine *sample(const char *more) {
   draft *d = draft_begin();
   fprintf(d->to,
-          "grains: {count: 200, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+          "seed: 4\ngrains: {count: 250, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
           "material: {young: 30e9, poisson: 0.3, density: 2675, friction: 0.45, damping: 0.002}\nmass_scaling: 1e5\n"
-          "pack: {method: drop_and_roll, width: 20e-3}\nintegrator: {dt: 2e-5}\n%s",
+          "pack: {method: drop_and_roll, width: 22e-3}\nintegrator: {dt: 2e-5}\n%s",
           more);
   return engine_start(d);
 }
 
-#define CONFINE "{kind: confine, pressure: 100e3, ramp: 0.5, friction: 0.3}"
+#define CONFINE "{kind: confine, pressure: 100e3, ramp: 0.5, friction: 0.1}"
 
 // ---- identities ----
 
@@ -96,7 +96,7 @@ static void check_identities(engine *e) {
 static void identities(void **state) {
   (void)state;
   engine *box = sample("gravity: [0.3, -1]\nwalls: [{from: [-1, 0], to: [1, 0]}, {from: [0, 0], to: [0, 1]}, "
-                       "{from: [20e-3, 0], to: [20e-3, 1], velocity: [-0.05, 0]}]\ncontact: {vR: 1e-5}\n"
+                       "{from: [22e-3, 0], to: [22e-3, 1], velocity: [-0.05, 0]}]\ncontact: {vR: 1e-5}\n"
                        "stages: [{kind: free, duration: 0.02, integrator: {dt: 1e-5}}]\n");
   for (int k = 0; k < 20; k++) {
     engine_steps(box, 100);
@@ -129,7 +129,7 @@ static void identities(void **state) {
 
 // Place on the loop of the outermost grain that touches a plate; side +1: bottom, direction -1: leftmost.
 static double outermost(const tal_sim *sim, int side, int direction) {
-  double found = -INFINITY;
+  double found = -(double)INFINITY;
   for (size_t c = 0; c < sim->wall_contacts.count; c++)
     if (sim->wall_contacts.overlap[c] > 0 && sim->walls.wall[sim->wall_contacts.j[c]].plate == side)
       found = fmax(found, direction * sim->grains.x[sim->wall_contacts.i[c]]);
@@ -148,7 +148,7 @@ static double mean_speed(const tal_grains *g) {
 // long as the ramp to go their own radius; shear is small.
 static void end_of_confinement(void **state) {
   (void)state;
-  engine *e = sample("continuum: {peel: 1}\ncontact: {tangential: spring}\nstages: [" CONFINE "]\n");
+  engine *e = sample("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
   engine_finish(e);
   tal_sim *sim = e->sim;
   tal_observed seen = tal_sim_driving(sim);
@@ -166,20 +166,11 @@ static void end_of_confinement(void **state) {
   for (int side = 1; side >= -1; side -= 2) {
     const tal_wall *plate = tal_walls_plate(&sim->walls, side);
     double width = outermost(sim, side, 1) - outermost(sim, side, -1), load = -side * plate->fy;
-    const tal_run *q = &sim->run;
-    const int32_t *node = sim->graph.loop.node;
-    double w2 = sim->grains.x[node[side > 0 ? q->arc_bottom_right : q->arc_top_right]] -
-                sim->grains.x[node[side > 0 ? q->arc_bottom_left : q->arc_top_left]];
-    print_message("load %g width %g arcs %g since refresh %ld vy %g\n", load / pressure / thickness, width, w2,
-                  q->step - q->refresh_step, plate->vy);
-    if (0 && !(fabs(load - pressure * thickness * width) < 0.02 * load))
+    if (!(fabs(load - pressure * thickness * width) < 0.01 * load))
       fail_msg("plate %d bears %.4g N, p h width is %.4g N", side, load, pressure * thickness * width);
+    assert_true(fabs(plate->vy) < 2e-3 * sim->constants.mean_radius / 0.5);
   }
-  print_message("speed %g  plates %g %g\n", mean_speed(&sim->grains) / (1e-3 * sim->constants.mean_radius / 0.5),
-                tal_walls_plate(&sim->walls, 1)->vy, tal_walls_plate(&sim->walls, -1)->vy);
-  tal_row row = engine_row(e);
-  print_message("kin %g el %g\n", row.kinetic, row.elastic);
-  assert_true(mean_speed(&sim->grains) < 1e-3 * sim->constants.mean_radius / 0.5);
+  assert_true(mean_speed(&sim->grains) < 0.01 * sim->constants.mean_radius / 0.5);
   assert_true(sim->run.rest <= 1e-3 && sim->run.pressure == pressure);
   engine_end(e);
 }
@@ -222,8 +213,6 @@ static void friction_sets_the_density(void **state) {
     row[k] = engine_row(e);
     engine_end(e);
   }
-  print_message("%g %g  %g %g\n", row[0].solid_fraction, row[1].solid_fraction, row[0].coordination_bearing,
-                row[1].coordination_bearing);
   assert_true(row[0].solid_fraction > row[1].solid_fraction + 0.005);
   assert_true(row[0].coordination_bearing > row[1].coordination_bearing + 0.2);
 }
@@ -233,60 +222,79 @@ static void friction_sets_the_density(void **state) {
 typedef struct strains {
   double axial, volumetric; // at the end
   double area;              // area of the loop over its area at the start, less 1
-  double height;            // change of the height by the loop's L_yy over the plates' approach, from 2e-3 strain on
+  double gradient;          // mean over time of the loop's L_yy over -rate/(1 - rate t), from 2e-3 strain on
   double jump, usual;       // largest change of the volumetric strain in a step, with and without a change of the loop
   int changes;              // of the loop
 } strains;
 
-// Follows the compression of a sample with many refreshes of its graph.
+enum { RATE_PER_THOUSAND = 100 };
+
+static void follow_step(engine *e, double start, double *before, size_t *nodes, strains *s) {
+  tal_sim *sim = e->sim;
+  engine_step(e);
+  tal_row row = engine_row(e);
+  double change = fabs(row.volumetric_strain - *before);
+  bool changed = sim->run.refresh_step == sim->run.step && sim->graph.loop.count != *nodes;
+  s->changes += changed;
+  *(changed ? &s->jump : &s->usual) = fmax(changed ? s->jump : s->usual, change);
+  *before = row.volumetric_strain;
+  *nodes = sim->graph.loop.count;
+  if (row.axial_strain < 2e-3)
+    return;
+  const tal_grains *g = &sim->grains;
+  double rate = 1e-3 * RATE_PER_THOUSAND, now = -rate / (1 - rate * (sim->run.time - start));
+  s->gradient +=
+      geo_loop_velocity_gradient(&sim->graph.loop, g->x, g->y, g->vx, g->vy).yy / now * sim->dt * rate / 8e-3;
+}
+
+// Follows a compression to 1 % whose graph is renewed every `refresh` steps.
 static strains compressed(int refresh) {
   char more[400];
   snprintf(
       more, sizeof more,
       "continuum: {refresh: %d}\ncontact: {tangential: spring}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.5, "
-      "friction: 0.3, tolerance: 0.1, unbalanced: 0.01}, {kind: compress, rate: 0.05, strain: 0.01}]\n",
-      refresh);
+      "friction: 0.3, tolerance: 0.1, unbalanced: 0.01}, {kind: compress, rate: %de-3, strain: 0.01}]\n",
+      refresh, RATE_PER_THOUSAND);
   engine *e = sample(more);
   tal_sim *sim = e->sim;
-  const tal_grains *g = &sim->grains;
-  strains s = {0};
   while (!sim->run.stage_done)
     engine_step(e);
   tal_row row = engine_row(e);
   assert_true(row.axial_strain == 0 && row.volumetric_strain == 0);
-  double before = 0, area = geo_loop_area(&sim->graph.loop, g->x, g->y), rise = 0, approach = 0;
-  size_t nodes = 0;
-  while (!tal_sim_done(sim)) {
-    engine_step(e);
-    row = engine_row(e);
-    tal_observed seen = tal_sim_driving(sim);
-    tal_macro macro;
-    tal_macro_measure(&seen, &macro);
-    double change = fabs(row.volumetric_strain - before);
-    bool changed = sim->run.refresh_step == sim->run.step && sim->graph.loop.count != nodes && nodes;
-    s.changes += changed;
-    *(changed ? &s.jump : &s.usual) = fmax(changed ? s.jump : s.usual, change);
-    before = row.volumetric_strain;
-    nodes = sim->graph.loop.count;
-    if (row.axial_strain < 2e-3)
-      continue;
-    rise += sim->dt * macro.velocity_gradient.yy * macro.height;
-    approach += sim->dt * 0.05 * sim->run.height0;
-  }
-  s.height = -rise / approach;
-  s.axial = row.axial_strain;
-  s.volumetric = row.volumetric_strain;
-  s.area = geo_loop_area(&sim->graph.loop, g->x, g->y) / area - 1;
-  print_message("refresh %d: axial %.9g vol %.6g area %.6g height %.4g jump %.3g usual %.3g changes %d\n", refresh,
-                s.axial, s.volumetric, s.area, s.height, s.jump, s.usual, s.changes);
+  strains s = {0};
+  double before = 0, start = sim->run.time, area = geo_loop_area(&sim->graph.loop, sim->grains.x, sim->grains.y);
+  size_t nodes = sim->graph.loop.count;
+  while (!tal_sim_done(sim))
+    follow_step(e, start, &before, &nodes, &s);
+  s.axial = sim->run.axial_strain;
+  s.volumetric = before;
+  s.area = geo_loop_area(&sim->graph.loop, sim->grains.x, sim->grains.y) / area - 1;
   engine_end(e);
   return s;
 }
 
+// MODEL: the axial strain ends within one step of what was asked; the volumetric strain goes on smoothly where the loop
+// gains or loses a grain, where its plain area jumps, and is the change of the area where the loop stays; it depends on
+// the refresh interval only as far as the motion does; the loop is compressed as the plates are, less what its corners
+// hang back that no plate touches.
 static void strains_of_a_compression(void **state) {
   (void)state;
-  strains often = compressed(50), seldom = compressed(250);
-  (void)often, (void)seldom;
+  static const int refresh[] = {20, 250};
+  strains s[2];
+  int changes = 0;
+  for (int k = 0; k < 2; k++) {
+    s[k] = compressed(refresh[k]);
+    assert_true(fabs(s[k].axial - 0.01) <= 1e-3 * RATE_PER_THOUSAND * 2e-5);
+    assert_true(s[k].usual < 1e-5 && s[k].jump <= 3 * s[k].usual);
+    if (s[k].changes == 0)
+      assert_true(fabs(s[k].volumetric - s[k].area) < 1e-12);
+    else
+      assert_true(fabs(s[k].volumetric - s[k].area) > 100 * s[k].usual);
+    assert_true(fabs(s[k].volumetric - s[0].volumetric) < 0.25 * s[k].axial);
+    assert_true(s[k].gradient > 0.5 && s[k].gradient < 1.25);
+    changes += s[k].changes;
+  }
+  assert_true(changes > 0);
 }
 
 int main(int argc, char **argv) {

@@ -258,7 +258,6 @@ static void assert_closes(engine *e, int first, double share) {
   }
   if (!(worst <= share))
     fail_msg("residual %.3g", worst);
-  print_message("residual %.3g\n", worst);
 }
 
 // MODEL: a thousand grains that fall in a box whose walls move, come and go.
