@@ -19,8 +19,9 @@
 // ---- the root -------------------------------------------------------------------------------------------------------
 
 // Root of u^c + b u = a by halving an interval, in extended precision.
-static double share_by_halving(double a, double b, double c) {
-  long double low = 0, high = fminl((long double)a / b, powl(a, 1 / (long double)c)) * 1.01L;
+static double share_by_halving(double a_given, double b_given, double c_given) {
+  const long double a = (long double)a_given, b = (long double)b_given, c = (long double)c_given;
+  long double low = 0, high = fminl(a / b, powl(a, 1 / c)) * 1.01L;
   for (int k = 0; k < 200; k++) {
     long double middle = (low + high) / 2;
     if (powl(middle, c) + b * middle > a)
