@@ -3,6 +3,7 @@
 
 #include "critical.h"
 #include "effects.h"
+#include "integrate.h"
 #include "sim.h"
 
 #include <math.h>
@@ -21,7 +22,8 @@ static void print_effects(const tal_sim *sim) {
                {TAL_EFFECT_GRAVITY, "gravity"},
                {TAL_EFFECT_BOUNDARY, "boundary forces"},
                {TAL_EFFECT_WALLS, "walls or plates"},
-               {TAL_EFFECT_HELD, "driven grains"}};
+               {TAL_EFFECT_HELD, "driven grains"},
+               {TAL_EFFECT_IMPLICIT, "friction solved implicitly"}};
   printf("effects       ");
   if (!(sim->effects & TAL_EFFECT_HERTZ))
     printf("linear contact");
@@ -72,15 +74,14 @@ static double planned_steps(const tal_scene *scene) {
 // Steps per second of this scene here, from a short trial on the packed grains.
 static double measured_rate(tal_sim *sim) {
   double started = clock_now(), took = 0;
-  int64_t steps = 0;
+  const int64_t first = sim->run.step;
   while (took < 0.5 && !tal_sim_done(sim)) {
     for (int k = 0; k < 20; k++)
       if (tal_sim_step(sim, NULL))
-        return steps ? (double)steps / (clock_now() - started) : (double)NAN;
-    steps += 20;
+        return (double)(sim->run.step - first) / (clock_now() - started);
     took = clock_now() - started;
   }
-  return took > 0 ? (double)steps / took : (double)NAN;
+  return took > 0 ? (double)(sim->run.step - first) / took : (double)NAN;
 }
 
 static double first_pressure(const tal_scene *scene) {
@@ -116,15 +117,16 @@ static void print_numbers(const tal_sim *sim) {
          sim->packing_solid_fraction, sim->packing_coordination, sim->packing_overlap);
   if (isfinite(k->vR))
     printf("vR            %.5g m/s\n", k->vR);
+  const double dt = (double)tal_integrate_longest(&scene->integrator) * scene->integrator.dt;
   double now = tal_critical_step(sim), confined = tal_critical_step_scene(scene, k, k->mean_mass / 2);
-  printf("dt/dt_crit    %.3g on the packed grains", scene->integrator.dt / now);
+  printf("dt/dt_crit    %.3g on the packed grains", dt / now);
   if (isfinite(confined))
-    printf(", %.3g for two mean grains under the load of the scene", scene->integrator.dt / confined);
+    printf(", %.3g for two mean grains under the load of the scene", dt / confined);
   printf("\n");
   double friction = tal_friction_step(sim, pressure);
-  if (isfinite(friction))
+  if (isfinite(friction) && !(sim->effects & TAL_EFFECT_IMPLICIT))
     printf("friction      explicit steps above %.3g s chatter by more than vR; dt is %.3g times that\n", friction,
-           scene->integrator.dt / friction);
+           dt / friction);
   if (isfinite(rate) && isfinite(pressure))
     printf("phi, psi      %.4g (quasi-static well below 1), %.4g (size, 2R/L)\n",
            tal_quasistatic_coefficient(sim, rate, pressure, height), 2 * k->mean_radius / height);

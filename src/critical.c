@@ -29,7 +29,7 @@ static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, dou
 // How much stiffer than the normal spring the tangential one is to grain i, turning included; at least 1.
 static double sideways(const tal_sim *sim, int32_t i) {
   const tal_grains *g = &sim->grains;
-  if (!(sim->effects & TAL_EFFECT_SPRING))
+  if (!(sim->effects & TAL_EFFECT_SPRING) || (sim->effects & TAL_EFFECT_IMPLICIT))
     return 1;
   double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;
   return fmax(1, sim->constants.tangential_ratio * turning);

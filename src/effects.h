@@ -12,13 +12,16 @@ enum tal_effect {
   TAL_EFFECT_GRAVITY = 32,    // body force
   TAL_EFFECT_BOUNDARY = 64,   // forces of a boundary on grains (pressure)
   TAL_EFFECT_WALLS = 128,     // walls and plates
-  TAL_EFFECT_HELD = 256       // fixed grains or held spins whose holders do work
+  TAL_EFFECT_HELD = 256,      // fixed grains or held spins whose holders do work
+  TAL_EFFECT_IMPLICIT = 512   // friction is solved apart from the sweep over the contacts (friction.h)
 };
 
 #define TAL_EFFECT_FRICTION (TAL_EFFECT_REGULARISED | TAL_EFFECT_SPRING)
 // What the contact law itself looks at.
 #define TAL_EFFECT_LAW                                                                                                 \
   (TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)
+// What it looks at for the forces along the normal alone.
+#define TAL_EFFECT_NORMAL (TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING)
 
 // A pure function that must vanish into the loop that calls it.
 #define TAL_KERNEL static inline __attribute__((always_inline))

@@ -133,10 +133,14 @@ TAL_KERNEL void sweep_block(tal_sim *sim, double dt, tal_law_constants constants
   X(TAL_EFFECT_DAMPING)                                                                                                \
   X(0)
 
+static unsigned law_effects(const tal_sim *sim) {
+  return sim->effects & (sim->effects & TAL_EFFECT_IMPLICIT ? TAL_EFFECT_NORMAL : TAL_EFFECT_LAW);
+}
+
 // The switch stands inside the parallel loop: a parallel region is outlined before inlining, and a mask passed into it
 // would no longer be a constant.
 static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, size_t start) {
-  switch (sim->effects & TAL_EFFECT_LAW) {
+  switch (law_effects(sim)) {
 #define X(mask)                                                                                                        \
   case (mask):                                                                                                         \
     sweep_block(sim, dt, constants, start, (mask));                                                                    \
@@ -144,7 +148,7 @@ static void sweep_variant(tal_sim *sim, double dt, tal_law_constants constants, 
     VARIANTS(X)
 #undef X
   default:
-    sweep_block(sim, dt, constants, start, sim->effects & TAL_EFFECT_LAW);
+    sweep_block(sim, dt, constants, start, law_effects(sim));
   }
 }
 
@@ -164,14 +168,14 @@ static void wall_slot(tal_sim *sim, double dt, tal_law_constants constants, size
   m.approach = -(near.nx * ux + near.ny * uy);
   m.slip = slip_speed(near.nx, near.ny, ux, uy, m.overlap, g->r * g->spin, g->spin, sim->effects);
   m.slip_distance = dt * slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r * g->spin, g->spin, sim->effects);
-  tal_law_force f = tal_contact_law(m, constants, sim->effects);
+  tal_law_force f = tal_contact_law(m, constants, law_effects(sim));
   slots->nx[c] = near.nx;
   slots->ny[c] = near.ny;
   slots->overlap[c] = m.overlap;
   slots->fe[c] = f.fe;
   slots->fd[c] = f.fd;
   slots->ft[c] = f.ft;
-  if (dt > 0) {
+  if (dt > 0 && !(sim->effects & TAL_EFFECT_IMPLICIT)) {
     slots->spring[c] = f.ft;
     slots->spring_stiffness[c] = f.spring_stiffness;
   }
@@ -273,6 +277,10 @@ tal_resultant tal_forces_gather(const tal_sim *sim, size_t grain) {
   return gather(sim, grain, sim->effects | TAL_EFFECT_SPIN);
 }
 
+tal_resultant tal_forces_gather_normal(const tal_sim *sim, size_t grain) {
+  return gather(sim, grain, sim->effects & ~(unsigned)TAL_EFFECT_FRICTION);
+}
+
 void tal_forces_resultants(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   for (size_t i = 0; i < g->count; i++) {
@@ -288,8 +296,8 @@ void tal_forces_resultants(tal_sim *sim) {
 }
 
 // One grain: force, second half kick, and the work of this step's forces: dt f . v is the exact discrete work of a
-// force that acts over the two half kicks around the instant of v [eq (16)].
-TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects) {
+// force that acts over the two half kicks around the instant of v [eq (16)]; credit is their common length.
+TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, double credit, unsigned effects) {
   tal_grains *g = &sim->grains;
   tal_resultant f = gather(sim, i, effects);
   double fx = f.elastic_x + f.viscous_x + f.friction_x, fy = f.elastic_y + f.viscous_y + f.friction_y;
@@ -316,45 +324,45 @@ TAL_KERNEL void finish_grain(tal_sim *sim, size_t i, double dt, unsigned effects
       held_power -= g->inverse_inertia[i] == 0 ? f.torque * omega : 0;
   }
   if (effects & TAL_EFFECT_FRICTION)
-    g->friction_work[i] += dt * friction_power;
+    g->friction_work[i] += credit * friction_power;
   if (effects & TAL_EFFECT_DAMPING)
-    g->damping_work[i] += dt * (f.viscous_x * vx + f.viscous_y * vy);
+    g->damping_work[i] += credit * (f.viscous_x * vx + f.viscous_y * vy);
   if (effects & TAL_EFFECT_BOUNDARY)
-    g->boundary_work[i] += dt * (g->bx[i] * vx + g->by[i] * vy);
+    g->boundary_work[i] += credit * (g->bx[i] * vx + g->by[i] * vy);
   if (effects & TAL_EFFECT_HELD) {
     held_power -= g->inverse_mass[i] == 0 ? fx * vx + fy * vy : 0;
-    g->held_work[i] += dt * held_power;
+    g->held_work[i] += credit * held_power;
   }
 }
 
-TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, unsigned effects) {
+TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, double credit, unsigned effects) {
   for (size_t i = start; i < end; i++)
-    finish_grain(sim, i, dt, effects);
+    finish_grain(sim, i, dt, credit, effects);
 }
 
 // A biaxial test with either friction or none; the rest by the run-time mask.
-static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt) {
+static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt, double credit) {
   const unsigned biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_WALLS | TAL_EFFECT_BOUNDARY;
   const unsigned kinds = TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY |
                          TAL_EFFECT_BOUNDARY | TAL_EFFECT_WALLS | TAL_EFFECT_HELD;
   switch (sim->effects & kinds) {
   case biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN:
-    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, credit, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
     break;
   case biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN:
-    finish_chunk(sim, start, end, dt, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
+    finish_chunk(sim, start, end, dt, credit, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
     break;
   case biaxial:
-    finish_chunk(sim, start, end, dt, biaxial);
+    finish_chunk(sim, start, end, dt, credit, biaxial);
     break;
   default:
-    finish_chunk(sim, start, end, dt, sim->effects & kinds);
+    finish_chunk(sim, start, end, dt, credit, sim->effects & kinds);
   }
 }
 
-void tal_forces_finish_step(tal_sim *sim, double dt) {
+void tal_forces_finish_step(tal_sim *sim, double dt, double credit) {
   const size_t count = sim->grains.count, chunks = (count + CHUNK - 1) / CHUNK;
 #pragma omp parallel for schedule(static) if (chunks > 1)
   for (size_t k = 0; k < chunks; k++)
-    finish_variant(sim, k * CHUNK, (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count, dt);
+    finish_variant(sim, k * CHUNK, (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count, dt, credit);
 }

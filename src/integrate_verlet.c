@@ -31,28 +31,37 @@ TAL_KERNEL void drift(tal_grains *g, tal_grain_record *record, size_t start, siz
   }
 }
 
-static void drift_all(tal_sim *sim) {
+static void drift_all(tal_sim *sim, double dt) {
   const size_t count = sim->grains.count, chunks = (count + CHUNK - 1) / CHUNK;
 #pragma omp parallel for schedule(static) if (chunks > 3)
   for (size_t k = 0; k < chunks; k++) {
     size_t end = (k + 1) * CHUNK < count ? (k + 1) * CHUNK : count;
-    drift(&sim->grains, sim->grain_records, k * CHUNK, end, sim->dt, sim->effects);
+    drift(&sim->grains, sim->grain_records, k * CHUNK, end, dt, sim->effects);
   }
 }
 
-static void advance(tal_sim *sim) {
-  drift_all(sim);
+void tal_integrate_drift(tal_sim *sim, double dt) {
+  drift_all(sim, dt);
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_drift(sim);
   if (tal_neighbours_stale(sim))
     tal_neighbours_rebuild(sim);
   if (sim->boundary)
     sim->boundary->apply(sim);
-  tal_forces_sweep(sim, sim->dt);
-  tal_forces_finish_step(sim, sim->dt);
+}
+
+void tal_integrate_finish(tal_sim *sim) {
+  tal_forces_finish_step(sim, sim->dt, 0.5 * (sim->dt + sim->dt_next));
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
 }
 
-const tal_integrator tal_verlet = {"verlet", "velocity Verlet, second order, velocities synchronised for the laws",
-                                   advance};
+void tal_integrate_verlet_step(tal_sim *sim) {
+  tal_integrate_drift(sim, sim->dt);
+  tal_forces_sweep(sim, sim->dt);
+  tal_integrate_finish(sim);
+}
+
+const tal_integrator tal_verlet = {.name = "verlet",
+                                   .help = "velocity Verlet, second order, velocities synchronised for the laws",
+                                   .advance = tal_integrate_verlet_step};

@@ -84,7 +84,7 @@ static void list_pairs(tal_sim *sim) {
   fresh.count = pairs->count;
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
-  if (sim->effects & TAL_EFFECT_SPRING)
+  if (sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT))
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
@@ -134,7 +134,7 @@ static void list_walls(tal_sim *sim) {
     }
   }
   sim->neighbours.wall_first[g->count] = (int32_t)fresh.count;
-  if (sim->effects & TAL_EFFECT_SPRING)
+  if (sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT))
     carry_springs(&sim->wall_contacts, &fresh);
   if (sim->neighbours.rebuilds > 0) { // what is there at the start is part of the start
     book_change(sim, &sim->wall_contacts, false);

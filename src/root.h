@@ -22,8 +22,8 @@ TAL_KERNEL double tal_double(uint64_t u) {
   return x;
 }
 
-// x >= 0, finite; inverse_exponent = 1/c in (0, 1].
-TAL_KERNEL double tal_root(double x, double inverse_exponent) {
+// ln x of a normal x > 0.
+TAL_KERNEL double tal_log(double x) {
   const uint64_t sqrt_half = 0x3fe6a09e667f3bcdULL; // bits of sqrt(1/2)
   const uint64_t magic = 0x4330000000000000ULL;     // bits of 2^52: integers below 2^52 become doubles by an OR
   // exponent + 1024, kept positive so that a logical shift does
@@ -37,10 +37,12 @@ TAL_KERNEL double tal_root(double x, double inverse_exponent) {
   double z2 = z * z, z4 = z2 * z2;
   double p = (1.0 / 3 + z * (1.0 / 5)) + z2 * (1.0 / 7 + z * (1.0 / 9));
   p = p + z4 * ((1.0 / 11 + z * (1.0 / 13)) + z2 * (1.0 / 15 + z * (1.0 / 17)) + z4 * (1.0 / 19));
-  double log_m = 2 * s + 2 * s * z * p;
-  // y = ln(x)/c = (exponent ln2 + ln m)/c in halves of a turn of 2^n
   const double ln2 = 0.693147180559945309417;
-  double y = (exponent * ln2 + log_m) * inverse_exponent;
+  return exponent * ln2 + (2 * s + 2 * s * z * p);
+}
+
+// e^y, |y| < 708.
+TAL_KERNEL double tal_exp(double y) {
   const double round = 6755399441055744.0; // 1.5 2^52
   double n = (y * 1.44269504088896340736 + round) - round;
   const double ln2_high = 0.693147180369123816490, ln2_low = 1.90821492927058770002e-10; // high part: 21 trailing zeros
@@ -52,8 +54,20 @@ TAL_KERNEL double tal_root(double x, double inverse_exponent) {
   double high = (1.0 / 3628800 + r * (1.0 / 39916800)) + r2 * (1.0 / 479001600 + r * (1.0 / 6227020800));
   double q = 1 + (r + r2 * (low + r4 * middle + r8 * high));
   double power = tal_double(((tal_bits(n + 4503599627370496.0 + 1023.0) & 0x7ffULL)) << 52); // 2^n
-  double root = q * power;
+  return q * power;
+}
+
+// x >= 0, finite; inverse_exponent = 1/c in (0, 1].
+TAL_KERNEL double tal_root(double x, double inverse_exponent) {
+  double root = tal_exp(tal_log(x) * inverse_exponent);
   return x < 1e-300 ? 0.0 : root;
+}
+
+// x^e of a normal x > 0 and any e, held between e^-700 and e^700.
+TAL_KERNEL double tal_power(double x, double e) {
+  double y = tal_log(x) * e;
+  y = y > 700 ? 700 : y;
+  return tal_exp(y < -700 ? -700 : y);
 }
 
 #endif

@@ -1,7 +1,9 @@
 #include "run.h"
 
 #include "critical.h"
+#include "effects.h"
 #include "forces.h"
+#include "integrate.h"
 #include "output.h"
 #include "progress.h"
 #include "step.h"
@@ -54,11 +56,12 @@ typedef struct job {
 // What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
 static size_t warnings(const job *this, char text[200], const char *out[1]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
-  if (!(this->sim->dt > friction))
+  double dt = tal_step_longest(this->sim);
+  if (!(dt > friction) || (this->sim->effects & TAL_EFFECT_IMPLICIT))
     return 0;
   snprintf(text, 200,
            "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
-           this->sim->dt, friction);
+           dt, friction);
   out[0] = text;
   return 1;
 }
@@ -98,16 +101,18 @@ static tal_status write_checkpoint(job *this, tal_error *err) {
   return report_run(this, "running", "", err);
 }
 
-// Whole number of steps nearest to `every`, at least 1; 0 for never.
-static int64_t cadence(double every, double dt) {
+// Small steps in the whole number of cycles of the integrator nearest to `every`, at least one; 0 for never.
+static int64_t cadence(double every, const tal_sim *sim) {
   if (!isfinite(every))
     return 0;
-  double steps = round(every / dt);
-  return steps < 1 ? 1 : (int64_t)steps;
+  const tal_scene_integrator *plan = &tal_sim_stage(sim)->integrator;
+  const int64_t cycle = tal_integrate_cycle(plan);
+  double cycles = round(every / (plan->dt * (double)cycle));
+  return cycles < 1 ? cycle : (int64_t)cycles * cycle;
 }
 
 static bool due(const tal_sim *sim, double every) {
-  int64_t steps = cadence(every, sim->dt);
+  int64_t steps = cadence(every, sim);
   return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
 }
 
@@ -133,7 +138,7 @@ static tal_status observe(job *this, tal_error *err) {
     status = write_row(this, fields, err);
   if (status)
     return status;
-  int64_t steps = cadence(plan->checkpoint_every, this->sim->dt);
+  int64_t steps = cadence(plan->checkpoint_every, this->sim);
   if (tal_sim_done(this->sim) || (steps > 0 && this->sim->run.stage_step % steps == 0))
     status = write_checkpoint(this, err);
   return status;
@@ -158,7 +163,7 @@ static tal_status advance(job *this, tal_error *err) {
     int64_t stage = this->sim->run.stage;
     tal_status status = tal_sim_step(this->sim, err);
     if (this->sim->run.stage != stage) { // the step belongs to the next stage
-      this->stage_first_step = this->sim->run.step - 1;
+      this->stage_first_step = this->sim->run.step - this->sim->run.stage_step;
       this->stage_started = clock_now();
     }
     if (status || (status = observe(this, err)))

@@ -86,6 +86,9 @@ typedef struct tal_scene_integrator {
   const char *scheme; // name of a registered integrator
   double dt;          // [s]
   bool force;         // run above dt_crit
+  int64_t m, n, q;    // two_timescale: m times (a step of n dt, q steps of dt)
+  int64_t sweeps;     // implicit_friction: over the contacts, per step
+  double tolerance;   // implicit_friction: sweeps again while a force changes by more than this share of mu fn
 } tal_scene_integrator;
 
 typedef struct tal_scene_stage {

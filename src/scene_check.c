@@ -238,6 +238,41 @@ static void check_walls(const checker *c) {
     check_wall(c, node, w);
 }
 
+// ---- integrators ----
+
+// A cycle of two time scales at `key`: P's long step is shorter than the cycle.
+static void check_cycle(const checker *c, const tal_node *node, const char *base, const tal_scene_integrator *plan) {
+  char key[80], text[200];
+  if (!named(plan->scheme, "two_timescale"))
+    return;
+  if (plan->m < 1 || plan->n < 1) {
+    snprintf(key, sizeof key, "%s.%s", base, plan->n < 1 ? "n" : "m");
+    tal_report_add(c->report, node, key, "is missing (scheme: two_timescale); accepted: a whole number in [1, 1e+06]");
+    return;
+  }
+  snprintf(key, sizeof key, "%s.n", base);
+  snprintf(text, sizeof text,
+           "%lld small steps are the whole cycle of m (n + q) = %lld; accepted: n below m (n + q), so q or m larger",
+           (long long)plan->n, (long long)(plan->m * (plan->n + plan->q)));
+  if (plan->n >= plan->m * (plan->n + plan->q))
+    tal_report_add(c->report, node, key, "%s", text);
+}
+
+static void check_cycles(const checker *c) {
+  const tal_scene_integrator *whole = &c->scene->integrator;
+  if (given(c, "integrator.m") && given(c, "integrator.n") && whole->m > 0 && whole->n > 0)
+    check_cycle(c, tal_node_nearest(c->root, "integrator.n"), "integrator", whole);
+  const tal_node *list = tal_node_get(c->root, "stages");
+  const tal_node *node = list ? list->child : NULL;
+  for (size_t s = 0; s < c->scene->stage_count; s++, node = node->next) {
+    const tal_node *own = tal_node_get(node, "integrator");
+    char base[64];
+    snprintf(base, sizeof base, "stages[%zu].integrator", s);
+    if (own)
+      check_cycle(c, own, base, &c->scene->stages[s].integrator);
+  }
+}
+
 static void check_refresh(const checker *c) {
   const tal_node *refresh = tal_node_find(c->root, "continuum.refresh");
   if (refresh && refresh->kind == TAL_NODE_MAP && refresh->count != 1)
@@ -257,4 +292,5 @@ void tal_scene_check(const tal_scene *scene, tal_node *root, tal_report *report)
   check_slip_speed(&c);
   check_walls(&c);
   check_refresh(&c);
+  check_cycles(&c);
 }

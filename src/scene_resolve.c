@@ -60,6 +60,18 @@ static void resolve_stage_integrator(const tal_scene *scene, tal_scene_stage *st
     stage->integrator.dt = own.dt;
   if (tal_node_find(node, "integrator.force"))
     stage->integrator.force = own.force;
+  if (own.m > 0)
+    stage->integrator.m = own.m;
+  if (own.n > 0)
+    stage->integrator.n = own.n;
+  if (tal_node_find(node, "integrator.q"))
+    stage->integrator.q = own.q;
+  if (own.sweeps > 0)
+    stage->integrator.sweeps = own.sweeps;
+  if (stage->integrator.sweeps < 1)
+    stage->integrator.sweeps = 4;
+  if (!isnan(own.tolerance))
+    stage->integrator.tolerance = own.tolerance;
 }
 
 static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report) {

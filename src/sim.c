@@ -5,6 +5,7 @@
 #include "effects.h"
 #include "energy.h"
 #include "forces.h"
+#include "integrate.h"
 #include "stage.h"
 #include "step.h"
 
@@ -106,13 +107,14 @@ static tal_status check_scene_step(const tal_sim *sim, tal_error *err) {
   double critical = tal_critical_step_scene(scene, &sim->constants, heaviest_reduced_mass(sim));
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_integrator *plan = &scene->stages[s].integrator;
-    if (plan->force || !(plan->dt > critical))
+    const double longest = (double)tal_integrate_longest(plan);
+    if (plan->force || !(longest * plan->dt > critical))
       continue;
     return tal_fail(
         err, TAL_BAD_INPUT,
-        "%s:%d: integrator.dt: %g s is above the critical step of the contacts; accepted: at most %.4g s, or "
+        "%s:%d: integrator.dt: %s%g s is above the critical step of the contacts; accepted: at most %.4g s, or "
         "force: true at your own risk",
-        scene->path, scene->line_dt, plan->dt, critical);
+        scene->path, scene->line_dt, longest > 1 ? "n dt = " : "", longest * plan->dt, critical / longest);
   }
   return TAL_OK;
 }
@@ -162,6 +164,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_contacts_clear(&sim->wall_contacts);
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
+  tal_friction_clear(&sim->sticking);
   free(sim->grain_records);
   free(sim->force_records);
   tal_graph_clear(&sim->graph);
@@ -185,6 +188,8 @@ tal_observed tal_sim_observe(tal_sim *sim) {
     sim->boundary->apply(sim);
   tal_forces_see_now(sim);
   tal_forces_sweep(sim, 0);
+  if (sim->effects & TAL_EFFECT_IMPLICIT)
+    tal_friction_solve(sim, 0.5 * sim->dt, false);
   return tal_sim_driving(sim);
 }
 
@@ -258,7 +263,7 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   row->plate_bottom = plate_load(sim, +1);
   row->plate_top = plate_load(sim, -1);
   tal_energy_row(sim, row);
-  row->dt_ratio = sim->dt / tal_critical_step(sim);
+  row->dt_ratio = tal_step_longest(sim) / tal_critical_step(sim);
   double rate = plan && plan->rate > 0 ? plan->rate : first_rate(sim->scene);
   row->phi = tal_quasistatic_coefficient(sim, rate, 0.5 * (row->sigma_xx + row->sigma_yy), macro.height);
   row->psi = 2 * sim->constants.mean_radius / macro.height;
@@ -271,7 +276,7 @@ void tal_sim_restored(tal_sim *sim) {
   sim->boundary = NULL;
   sim->boundary_moved = true;
   if (plan) {
-    sim->dt = plan->integrator.dt;
+    sim->dt = tal_step_length(sim, sim->run.stage_step);
     sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
     if (plan->pressure > 0)
       sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");

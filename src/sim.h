@@ -4,6 +4,7 @@
 
 #include "contacts.h"
 #include "continuum.h"
+#include "friction.h"
 #include "grains.h"
 #include "neighbours.h"
 #include "pack.h"
@@ -124,13 +125,15 @@ struct tal_sim {
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
   tal_force_record *force_records; // owned; [pairs.capacity] what they answer
   tal_neighbours neighbours;
+  tal_friction_system sticking; // scratch of friction solved implicitly
   tal_graph graph;
   tal_run run;
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
   const tal_boundary *boundary; // what presses the loop now, NULL: nothing
   bool boundary_moved;          // the boundary acts on other grains than at the last evaluation
   double friction;              // [-] of grain-grain contacts now (a stage may change it)
-  double dt;                    // [s] of the current stage
+  double dt;                    // [s] of the step being taken; between two steps: of the coming one
+  double dt_next;               // [s] of the step after the one being taken
   unsigned effects;             // mask of effects.h that the hot loop pays for
   double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
 };

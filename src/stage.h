@@ -9,6 +9,8 @@ struct tal_stage {
   const char *name;
   const char *help;
   bool uses_graph; // the graph is kept fresh during the stage; else it is built for output only
+  // Small steps that the stage takes in all; NULL: not known beforehand.
+  int64_t (*steps)(const tal_scene_stage *plan);
   // Sets plates, pressure, friction, boundary. Forces are evaluated afterwards.
   tal_status (*begin)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
   // Before each step: pressure and wall velocities of the step.

@@ -23,16 +23,21 @@ static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   tal_plates_drive(sim, plan->rate * sim->run.height0);
 }
 
+static int64_t steps(const tal_scene_stage *plan) {
+  return llround(plan->strain / plan->rate / plan->integrator.dt);
+}
+
 static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   (void)err;
   sim->run.axial_strain = 1 - tal_plates_distance(sim) / sim->run.height0;
-  sim->run.stage_done = sim->run.stage_step >= llround(plan->strain / plan->rate / sim->dt);
+  sim->run.stage_done = sim->run.stage_step >= steps(plan);
   return TAL_OK;
 }
 
 const tal_stage tal_stage_compress = {.name = "compress",
                                       .help = "biaxial compression between plates at a constant rate",
                                       .uses_graph = true,
+                                      .steps = steps,
                                       .begin = begin,
                                       .before_step = before_step,
                                       .after_step = after_step};

@@ -19,14 +19,19 @@ static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   (void)sim, (void)plan;
 }
 
+static int64_t steps(const tal_scene_stage *plan) {
+  return llround(plan->duration / plan->integrator.dt);
+}
+
 static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   (void)err;
-  sim->run.stage_done = sim->run.stage_step >= llround(plan->duration / sim->dt);
+  sim->run.stage_done = sim->run.stage_step >= steps(plan);
   return TAL_OK;
 }
 
 const tal_stage tal_stage_free = {.name = "free",
                                   .help = "free motion for a duration",
+                                  .steps = steps,
                                   .begin = begin,
                                   .before_step = before_step,
                                   .after_step = after_step};

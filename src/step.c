@@ -50,6 +50,11 @@ static bool any_damping(const tal_sim *sim) {
   return law->restitution < 1 || law->damping > 0;
 }
 
+static const char *scheme(const tal_sim *sim) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  return plan ? plan->integrator.scheme : sim->scene->integrator.scheme;
+}
+
 void tal_step_effects(tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
@@ -67,6 +72,8 @@ void tal_step_effects(tal_sim *sim) {
     effects |= TAL_EFFECT_WALLS;
   if (any_held_motion(&sim->grains))
     effects |= TAL_EFFECT_HELD;
+  if ((effects & TAL_EFFECT_FRICTION) && tal_integrator_find(scheme(sim))->implicit)
+    effects |= TAL_EFFECT_IMPLICIT;
   sim->effects = effects;
 }
 
@@ -87,15 +94,36 @@ static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
       sim->walls.wall[w].friction = sim->friction;
 }
 
+// The same in small steps.
+static int64_t small_steps(const tal_sim *sim, int64_t done) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
+  const tal_integrator *scheme = tal_integrator_find(plan->integrator.scheme);
+  int64_t length = scheme->length ? scheme->length(&plan->integrator, done) : 1;
+  int64_t left = sim->stage->steps ? sim->stage->steps(plan) - done : length;
+  return left > 0 && left < length ? left : length;
+}
+
+double tal_step_length(const tal_sim *sim, int64_t done) {
+  return (double)small_steps(sim, done) * tal_sim_stage(sim)->integrator.dt;
+}
+
+double tal_step_longest(const tal_sim *sim) {
+  const tal_scene_stage *stage = tal_sim_stage(sim);
+  const tal_scene_integrator *plan = stage ? &stage->integrator : &sim->scene->integrator;
+  return (double)tal_integrate_longest(plan) * plan->dt;
+}
+
 static tal_status check_step(const tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   double critical = tal_critical_step(sim);
-  if (plan->integrator.force || sim->dt <= critical)
+  double longest = tal_step_longest(sim);
+  if (plan->integrator.force || longest <= critical)
     return TAL_OK;
   return tal_fail(err, TAL_INVALID,
-                  "integrator.dt = %g s is above the critical step %.4g s of the contacts at t = %g s (stage %d, %s); "
+                  "integrator.%s = %g s is above the critical step %.4g s of the contacts at t = %g s (stage %d, %s); "
                   "a smaller dt, or integrator.force: true at your own risk",
-                  sim->dt, critical, sim->run.time, (int)sim->run.stage, plan->kind);
+                  longest > plan->integrator.dt ? "n dt" : "dt", longest, critical, sim->run.time, (int)sim->run.stage,
+                  plan->kind);
 }
 
 // Asks the stage whether it is over; the last instant of a stage counts half in the ledger.
@@ -112,8 +140,8 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
   sim->stage = tal_stage_find(plan->kind);
-  sim->dt = plan->integrator.dt;
   run->stage_step = 0;
+  sim->dt = tal_step_length(sim, 0);
   run->stage_start = run->time;
   run->stage_done = 0;
   run->stage_begun = 1;
@@ -232,12 +260,15 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
   sim->stage->before_step(sim, plan); // pressure and wall velocities of the step (22)-(25)
-  run->step++;
-  run->stage_step++;
-  run->time = run->stage_start + (double)run->stage_step * sim->dt;
+  const int64_t length = small_steps(sim, run->stage_step), before = run->step;
+  run->step += length;
+  run->stage_step += length;
+  run->time = run->stage_start + (double)run->stage_step * plan->integrator.dt;
+  sim->dt_next = tal_step_length(sim, run->stage_step);
   tal_integrator_find(plan->integrator.scheme)->advance(sim); // (12)-(17)
+  sim->dt = sim->dt_next;
   run->force_evaluations++;
-  if (run->step % INSPECT_EVERY == 0) {
+  if (run->step / INSPECT_EVERY != before / INSPECT_EVERY) {
     tal_forces_expand(sim);
     if ((status = tal_step_inspect(sim, err)))
       return status;

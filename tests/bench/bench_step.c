@@ -98,7 +98,7 @@ static void sweep(tal_sim *sim) {
   tal_forces_sweep(sim, 0);
 }
 static void finish(tal_sim *sim) {
-  tal_forces_finish_step(sim, 0);
+  tal_forces_finish_step(sim, 0, 0);
 }
 static void rebuild(tal_sim *sim) {
   tal_neighbours_rebuild(sim);
