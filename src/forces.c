@@ -342,7 +342,7 @@ TAL_KERNEL void finish_chunk(tal_sim *sim, size_t start, size_t end, double dt, 
 
 // A biaxial test with either friction or none; the rest by the run-time mask.
 static void finish_variant(tal_sim *sim, size_t start, size_t end, double dt, double credit) {
-  const unsigned biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_WALLS | TAL_EFFECT_BOUNDARY;
+  enum { biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_WALLS | TAL_EFFECT_BOUNDARY };
   const unsigned kinds = TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY |
                          TAL_EFFECT_BOUNDARY | TAL_EFFECT_WALLS | TAL_EFFECT_HELD;
   switch (sim->effects & kinds) {
