@@ -38,11 +38,12 @@ static double width_at_plate(const tal_sim *sim, int side) {
 
 static void servo(tal_sim *sim, int side, double target, double speed_limit) {
   tal_wall *plate = tal_walls_plate(&sim->walls, side);
-  double load = -side * plate->fy; // grains push the bottom plate (side +1) down
+  double elastic = -side * (plate->fy - plate->damping_fy); // grains push the bottom plate (side +1) down
   double resistance = plate->contact_stiffness * sim->dt + plate->contact_damping;
-  double outward = resistance > 0 ? 0.8 * (load - target) / resistance : -speed_limit;
-  outward = fmax(-speed_limit, fmin(speed_limit, outward));
-  plate->vy = -side * outward;
+  double outward = -speed_limit;
+  if (resistance > 0)
+    outward = -side * plate->contact_vy + 0.8 * (elastic - target) / resistance;
+  plate->vy = -side * fmax(-speed_limit, fmin(speed_limit, outward));
 }
 
 void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit) {

@@ -23,6 +23,7 @@
   X(double, fy, "N", STATE, "force of the grains on the wall at the last step")                                        \
   X(double, contact_stiffness, "N/m", STATE, "sum of the tangent stiffness of its contacts at the last step")          \
   X(double, contact_damping, "N s/m", STATE, "sum of the damping coefficients of its contacts at the last step")       \
+  X(double, contact_vy, "m/s", STATE, "mean vertical velocity of its touching grains, weighted by that stiffness")      \
   X(double, friction_fx, "N", STATE, "tangential part of that force")                                                  \
   X(double, friction_fy, "N", STATE, "tangential part of that force")                                                  \
   X(double, damping_fx, "N", STATE, "viscous part of that force")                                                      \
