@@ -23,7 +23,7 @@ static void print_effects(const tal_sim *sim) {
                {TAL_EFFECT_BOUNDARY, "boundary forces"},
                {TAL_EFFECT_WALLS, "walls or plates"},
                {TAL_EFFECT_HELD, "driven grains"},
-               {TAL_EFFECT_IMPLICIT, "friction solved implicitly"}};
+               {TAL_EFFECT_IMPLICIT, "friction and damping solved implicitly"}};
   printf("effects       ");
   if (!(sim->effects & TAL_EFFECT_HERTZ))
     printf("linear contact");
@@ -118,7 +118,8 @@ static void print_numbers(const tal_sim *sim) {
   if (isfinite(k->vR))
     printf("vR            %.5g m/s\n", k->vR);
   const double dt = (double)tal_integrate_longest(&scene->integrator) * scene->integrator.dt;
-  double now = tal_critical_step(sim), confined = tal_critical_step_scene(scene, k, k->mean_mass / 2);
+  double now = tal_critical_step(sim),
+         confined = tal_critical_step_scene(scene, k, k->mean_mass / 2, !(sim->effects & TAL_EFFECT_IMPLICIT));
   printf("dt/dt_crit    %.3g on the packed grains", dt / now);
   if (isfinite(confined))
     printf(", %.3g for two mean grains under the load of the scene", dt / confined);

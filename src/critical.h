@@ -14,8 +14,9 @@ double tal_quasistatic_coefficient(const tal_sim *sim, double rate, double press
 // Largest overlap over the smaller radius (walls: the grain's radius); *grain: who, -1 without contacts.
 double tal_largest_overlap(const tal_sim *sim, int64_t *grain);
 // What the scene alone says: critical step [s] of the softest contact it can make, INFINITY when it says nothing.
-// reduced_mass [kg] of the heaviest two bodies.
-double tal_critical_step_scene(const tal_scene *scene, const tal_constants *constants, double reduced_mass);
+// reduced_mass [kg] of the heaviest two bodies; damped: false for a scheme that solves for the damping.
+double tal_critical_step_scene(const tal_scene *scene, const tal_constants *constants, double reduced_mass,
+                               bool damped);
 // The step [s] above which explicit regularised friction at the force of a confined contact overshoots by more than vR:
 // it chatters; eq (27). INFINITY without such friction. Printed, never refused.
 double tal_friction_step(const tal_sim *sim, double pressure);

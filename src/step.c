@@ -72,7 +72,7 @@ void tal_step_effects(tal_sim *sim) {
     effects |= TAL_EFFECT_WALLS;
   if (any_held_motion(&sim->grains))
     effects |= TAL_EFFECT_HELD;
-  if ((effects & TAL_EFFECT_FRICTION) && tal_integrator_find(scheme(sim))->implicit)
+  if ((effects & (TAL_EFFECT_FRICTION | TAL_EFFECT_DAMPING)) && tal_integrator_find(scheme(sim))->implicit)
     effects |= TAL_EFFECT_IMPLICIT;
   sim->effects = effects;
 }
@@ -175,6 +175,7 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   tal_grains *g = &sim->grains;
   if (run->strain_begun && sim->graph.valid && run->refresh_area > 0)
     run->log_volume += log(geo_loop_area(&sim->graph.loop, g->x, g->y) / run->refresh_area);
+  tal_plates_mark(sim);
   tal_status status = tal_graph_refresh(&sim->graph, g, err);
   if (status)
     return status;
