@@ -1,7 +1,7 @@
 // Head-on impact of two bodies that meet at a given speed: how fast they part and how long they touch, for the normal
 // laws of docs/method.md with the force clipped at zero, eqs (60)-(66). The contact is over when the force is zero.
-// Hertz: a high-order solution of the motion, as a function of one damping number; linear: closed forms. Knows no scene:
-// damping.h does.
+// Hertz: a high-order solution of the motion, as a function of one damping number; linear: closed forms. Knows no
+// scene: damping.h does.
 #ifndef TAL_IMPACT_H
 #define TAL_IMPACT_H
 

@@ -49,28 +49,34 @@ typedef struct job {
   double started, stage_started;
   int64_t stage_first_step, first_step;
   double wall_before; // [s] of the parts of the run before this one
+  double phi;         // largest of the rows of stages with a rate
   int cores;
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-// What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
-static size_t warnings(const job *this, char text[200], const char *out[1]) {
+enum { WARNINGS = 2, WARNING_SIZE = 200 };
+
+// What the user should know about the accuracy of this run; count of sentences in `text`.
+static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
   double dt = tal_step_longest(this->sim);
-  if (!(dt > friction) || (this->sim->effects & TAL_EFFECT_IMPLICIT))
-    return 0;
-  snprintf(text, 200,
-           "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
-           dt, friction);
-  out[0] = text;
-  return 1;
+  size_t count = 0;
+  if (dt > friction && !(this->sim->effects & TAL_EFFECT_IMPLICIT))
+    snprintf(text[count++], WARNING_SIZE,
+             "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
+             dt, friction);
+  if (this->phi > TAL_QUASISTATIC_LIMIT)
+    snprintf(text[count++], WARNING_SIZE,
+             "phi reached %.3g: above %g the deformation is not quasi-static; lower mass_scaling or rate", this->phi,
+             TAL_QUASISTATIC_LIMIT);
+  return count;
 }
 
 static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
-  char text[200];
-  const char *sentences[1];
+  char text[WARNINGS][WARNING_SIZE];
+  const char *const sentences[WARNINGS] = {text[0], text[1]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
@@ -81,7 +87,7 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
                            .stages = this->stages,
                            .stage_count = this->scene->stage_count,
                            .warnings = sentences,
-                           .warning_count = warnings(this, text, sentences)};
+                           .warning_count = warnings(this, text)};
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
@@ -119,6 +125,9 @@ static bool due(const tal_sim *sim, double every) {
 static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
+  const tal_scene_stage *plan = tal_sim_stage(this->sim);
+  if (plan && plan->rate > 0 && this->sim->run.stage_begun)
+    this->phi = fmax(this->phi, this->row.phi);
   if ((status = tal_output_row(this->output, &this->row, err)))
     return status;
   if (fields && (status = tal_output_fields(this->output, this->sim, err)))
