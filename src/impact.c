@@ -13,31 +13,39 @@
 #include <stdbool.h>
 #include <string.h>
 
-static const double greatest_number = 1e180; // beyond it e is below 1e-300
+static const double greatest_number = 1e90; // beyond it e is below 2e-150
 
-// Overlap^1/2, its growth rate in stretched time (= the approach speed), time, loss by the damper over b.
-enum { ROOT, SPEED, TIME, LOSS, SIZE };
+// Overlap^1/2, approach speed or load, time, loss by the damper over b.
+enum { ROOT, DRIVE, TIME, LOSS, SIZE };
 
-// Force a z^3 + b z w in units of the impact: a = 1, b = beta for weak damping, a = beta^(-5/3), b = 1 for strong.
+// Force a z^3 + b z w in units of the impact: a = 1, b = beta for weak damping, a = beta^(-5/3), b = 1 for strong, z
+// the root of the overlap, w the approach speed. The force over z is the load u = a z^2 + b w. Weak damping: w is
+// integrated; at the end it is of order 1. Strong damping: u is; w then tends to -a z^2, and u would be a difference of
+// near equals.
 typedef struct motion {
   double a, b;
+  bool strong;
 } motion;
+
+static double speed(const motion *m, const double *y) {
+  return m->strong ? y[DRIVE] - m->a * y[ROOT] * y[ROOT] : y[DRIVE];
+}
 
 // Eq (62).
 static int rates(double p, const double *y, double *rate, void *data) {
   (void)p;
   const motion *m = data;
-  double z = y[ROOT], w = y[SPEED];
+  double z = y[ROOT], w = speed(m, y);
   rate[ROOT] = w;
-  rate[SPEED] = -2 * z * z * (m->a * z * z + m->b * w);
+  rate[DRIVE] = m->strong ? 2 * m->a * z * w - 2 * z * z * y[DRIVE] : -2 * z * z * (m->a * z * z + m->b * w);
   rate[TIME] = 2 * z;
   rate[LOSS] = 2 * z * z * w * w;
   return GSL_SUCCESS;
 }
 
-// The force over z: falls through zero where the contact ends, and stays below it where a step has passed z = 0.
+// Falls through zero where the contact ends, and stays below it where a step has passed z = 0.
 static double load(const motion *m, const double *y) {
-  return m->a * y[ROOT] * fabs(y[ROOT]) + m->b * y[SPEED];
+  return m->strong ? y[DRIVE] : m->a * y[ROOT] * fabs(y[ROOT]) + m->b * y[DRIVE];
 }
 
 // Part of a step, for the root finder: from the state `before` on.
@@ -85,13 +93,12 @@ static void end_within(gsl_odeiv2_step *step, gsl_odeiv2_system *system, double 
 // From touching to the zero of the force; y becomes the state there.
 static void integrate(motion *m, double *y) {
   gsl_odeiv2_system system = {rates, NULL, SIZE, m};
-  // strong damping: the speed runs down to order a before it turns
-  const double scale[SIZE] = {1, fmin(1, m->a), 1, 1};
+  const double scale[SIZE] = {1, m->a * m->a, 1, 1}; // strong damping: the load runs down to order a^2, then crosses 0
   gsl_odeiv2_step *step = gsl_odeiv2_step_alloc(gsl_odeiv2_step_rk8pd, SIZE);
   gsl_odeiv2_control *control = gsl_odeiv2_control_scaled_new(1e-14, 1e-14, 1, 0, scale, SIZE);
   gsl_odeiv2_evolve *evolve = gsl_odeiv2_evolve_alloc(SIZE);
   double p = 0, h = 1e-2, before[SIZE], from;
-  memcpy(y, (const double[SIZE]){[SPEED] = 1}, SIZE * sizeof *y);
+  memcpy(y, (const double[SIZE]){[DRIVE] = 1}, SIZE * sizeof *y);
   do {
     from = p;
     memcpy(before, y, sizeof before);
@@ -111,10 +118,10 @@ tal_impact tal_impact_hertz(double damping_number) {
     return (tal_impact){1, 0, pow(1.25, 0.4) * 0.8 * sqrt(TAL_PI) * tgamma(0.4) / tgamma(0.9)};
   double beta = fmin(damping_number, greatest_number), y[SIZE];
   bool strong = beta > 1;
-  motion m = {.a = strong ? pow(beta, -5.0 / 3) : 1, .b = strong ? 1 : beta};
+  motion m = {.strong = strong, .a = strong ? pow(beta, -5.0 / 3) : 1, .b = strong ? 1 : beta};
   integrate(&m, y);
   double z2 = y[ROOT] * y[ROOT];
-  double e = strong ? m.a * z2 : -y[SPEED]; // equal at the end; the one that is not a small difference
+  double e = -speed(&m, y);
   double lost = 2 * (m.b * y[LOSS] + 0.4 * m.a * z2 * z2 * y[ROOT]);
   return (tal_impact){e, lost / (1 + e), y[TIME] * (strong ? pow(beta, -2.0 / 3) : 1)};
 }
