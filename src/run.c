@@ -122,12 +122,21 @@ static bool due(const tal_sim *sim, double every) {
   return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
 }
 
+// phi of the row just taken where the stage has a rate, else 0. Not below the stage's pressure: a packing that is
+// compressed as it was made bears no stress at first.
+static double phi_now(const job *this) {
+  const tal_scene_stage *plan = tal_sim_stage(this->sim);
+  if (!plan || !(plan->rate > 0))
+    return 0;
+  double height = 2 * this->sim->constants.mean_radius / this->row.psi;
+  double pressure = fmax(0.5 * (this->row.sigma_xx + this->row.sigma_yy), plan->pressure);
+  return tal_quasistatic_coefficient(this->sim, plan->rate, pressure, height);
+}
+
 static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
-  const tal_scene_stage *plan = tal_sim_stage(this->sim);
-  if (plan && plan->rate > 0 && this->sim->run.stage_begun)
-    this->phi = fmax(this->phi, this->row.phi);
+  this->phi = fmax(this->phi, phi_now(this));
   if ((status = tal_output_row(this->output, &this->row, err)))
     return status;
   if (fields && (status = tal_output_fields(this->output, this->sim, err)))
