@@ -1,4 +1,4 @@
-// How much a contact is damped: from material.damping, contact.damping or contact.restitution, eqs (1), (4), (61).
+// How much a contact is damped: from material.damping, contact.damping or contact.restitution, eqs (1), (4), (64).
 // With `restitution` each contact gets the damping that its own stiffness and reduced mass need, so that every pair
 // delivers e: at any speed for the linear law, at restitution_speed for Hertz.
 #ifndef TAL_DAMPING_H

@@ -15,6 +15,7 @@
 #include "base.h"
 #include "continuum.h"
 #include "critical.h"
+#include "impact.h"
 #include "energy.h"
 #include "figures.h"
 #include "output.h"
