@@ -1,5 +1,6 @@
 #include "critical.h"
 
+#include "damping.h"
 #include "effects.h"
 #include "law.h"
 
@@ -109,18 +110,15 @@ double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
 static double confined_slope(const tal_scene *scene, const tal_constants *k, double pressure, double *damping) {
   double stiffness = tal_hertz_stiffness(k->modulus, k->modulus, k->mean_radius / 2);
   double overlap = pow(pressure * 2 * k->mean_radius * k->thickness / stiffness, 2.0 / 3);
-  *damping = scene->material.damping * stiffness * sqrt(overlap);
+  *damping = tal_damping_coefficient(scene, k, stiffness, k->mean_mass / 2) * sqrt(overlap);
   return tal_hertz_slope(stiffness, sqrt(overlap));
 }
 
 double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, double reduced_mass, bool damped) {
   if (strcmp(scene->contact.normal, "linear") == 0) {
-    double stiffness = scene->contact.stiffness, damping = 0;
-    if (!isnan(scene->contact.damping))
-      damping = scene->contact.damping;
-    if (!isnan(scene->contact.restitution))
-      damping = 2 * tal_linear_damping_ratio(scene->contact.restitution) * sqrt(stiffness * reduced_mass);
-    return tal_critical_step_pair(stiffness, damped ? damping : 0, reduced_mass);
+    double stiffness = scene->contact.stiffness;
+    double damping = damped ? tal_damping_coefficient(scene, k, stiffness, reduced_mass) : 0;
+    return tal_critical_step_pair(stiffness, damping, reduced_mass);
   }
   double least = (double)INFINITY;
   for (size_t s = 0; s < scene->stage_count; s++) {

@@ -2,6 +2,7 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
+#include "damping.h"
 #include "law.h"
 #include "sim.h"
 
@@ -27,12 +28,7 @@ static double reduced_mass(double inverse_i, double inverse_j) {
 }
 
 static double slot_damping(const tal_sim *sim, double stiffness, double mass) {
-  const tal_scene_contact *law = &sim->scene->contact;
-  if (sim->effects & TAL_EFFECT_HERTZ)
-    return sim->scene->material.damping * stiffness;
-  if (isnan(law->restitution))
-    return isnan(law->damping) ? 0 : law->damping;
-  return 2 * tal_linear_damping_ratio(law->restitution) * sqrt(stiffness * mass);
+  return tal_damping_coefficient(sim->scene, &sim->constants, stiffness, mass);
 }
 
 static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t j) {

@@ -2,6 +2,7 @@
 
 #include "boundary.h"
 #include "critical.h"
+#include "damping.h"
 #include "effects.h"
 #include "energy.h"
 #include "forces.h"
@@ -40,6 +41,8 @@ static void set_constants(tal_sim *sim) {
   k->skin = scene->skin * 2 * k->mean_radius;
   k->tangential_ratio =
       isnan(scene->contact.tangential_ratio) ? 2 * (1 - nu) / (2 - nu) : scene->contact.tangential_ratio;
+  k->damping_number = tal_damping_number(scene);
+  k->restitution_speed = isnan(scene->contact.restitution_speed) ? k->vR : scene->contact.restitution_speed;
 }
 
 static void add_wall(tal_sim *sim, const tal_scene_wall *plan) {

@@ -113,6 +113,8 @@ typedef struct tal_constants {
   double modulus;          // [Pa] young / (1 - poisson^2) of the grains
   double skin;             // [m]
   double tangential_ratio; // k_t / k_n of the spring law
+  // what contact.restitution asks for: beta or zeta of eqs (60), (5), NAN without it; [m/s] where Hertz delivers it
+  double damping_number, restitution_speed;
 } tal_constants;
 
 struct tal_sim {

@@ -3,6 +3,7 @@
 
 #include "boundary.h"
 #include "critical.h"
+#include "damping.h"
 #include "effects.h"
 #include "energy.h"
 #include "forces.h"
@@ -43,13 +44,6 @@ static bool any_friction(const tal_sim *sim) {
   return false;
 }
 
-static bool any_damping(const tal_sim *sim) {
-  const tal_scene_contact *law = &sim->scene->contact;
-  if (tal_normal_law_find(law->normal)->effects & TAL_EFFECT_HERTZ)
-    return sim->scene->material.damping > 0;
-  return law->restitution < 1 || law->damping > 0;
-}
-
 static const char *scheme(const tal_sim *sim) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   return plan ? plan->integrator.scheme : sim->scene->integrator.scheme;
@@ -58,7 +52,7 @@ static const char *scheme(const tal_sim *sim) {
 void tal_step_effects(tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
-  if (any_damping(sim))
+  if (tal_damping_any(scene))
     effects |= TAL_EFFECT_DAMPING;
   if (any_friction(sim))
     effects |= tal_tangential_law_find(scene->contact.tangential)->effects;
