@@ -1,5 +1,5 @@
 // Collects the messages of a scene: the ten first in file order, whatever the order in which they are found; those of
-// --set come last. Private to scene*.c.
+// --set come last. Private to scene*.c and study*.c.
 #ifndef TAL_SCENE_REPORT_H
 #define TAL_SCENE_REPORT_H
 
