@@ -78,7 +78,7 @@ static int work(const tal_study *study, const char *dir, const tal_cli_options *
   if (!options->merge)
     status = run(study, dir, options, &err);
   if (status == TAL_INTERRUPTED) {
-    fprintf(stderr, "talus: interrupted; go on with: talus study %s -o %s\n", options->argument, dir);
+    fprintf(stderr, "talus: interrupted; the same command goes on\n");
     return status;
   }
   if (status)

@@ -22,6 +22,7 @@ static const struct {
 typedef struct picture {
   const tal_study_summary *s;
   size_t m;
+  double scale;          // from the metric's unit to the axis: 1, or to per cent of the reference's mean
   double low, high;      // range of errors
   double floor, unclear; // median standard error of the differences, and half width of their interval
   double least, most;    // range of costs
@@ -33,7 +34,7 @@ static bool drawable(const picture *p, size_t k) {
 }
 
 static double error_of(const picture *p, size_t k) {
-  return fabs(tal_study_cell_of(p->s, k, p->m)->difference.mean);
+  return p->scale * fabs(tal_study_cell_of(p->s, k, p->m)->difference.mean);
 }
 
 // Median over the settings drawn.
@@ -42,13 +43,22 @@ static double median_of(const picture *p, bool half) {
   size_t n = 0;
   for (size_t k = 0; k < p->s->study->setting_count; k++) {
     const tal_difference *d = &tal_study_cell_of(p->s, k, p->m)->difference;
-    const double value = half ? d->half : d->error;
+    const double value = p->scale * (half ? d->half : d->error);
     if (drawable(p, k) && isfinite(value))
       list[n++] = value;
   }
   const double median = tal_median(list, n);
   free(list);
   return median;
+}
+
+static double bar_of(const picture *p, size_t k) {
+  const double error = p->scale * tal_study_cell_of(p->s, k, p->m)->difference.error;
+  return isfinite(error) ? error : 0;
+}
+
+static double limit_of(const picture *p) {
+  return p->scale * tal_study_limit(p->s, p->m);
 }
 
 static void stretch(picture *p, double error) {
@@ -60,6 +70,9 @@ static void stretch(picture *p, double error) {
 
 // False when there is nothing to see.
 static bool measure(picture *p) {
+  const tal_study *study = p->s->study;
+  const double mean = fabs(tal_study_cell_of(p->s, study->reference_setting, p->m)->estimate.mean);
+  p->scale = study->metrics[p->m].relative && mean > 0 ? 100 / mean : 1;
   p->low = p->least = HUGE_VAL;
   p->high = p->most = 0;
   size_t count = 0;
@@ -73,14 +86,14 @@ static bool measure(picture *p) {
     if (reference)
       continue;
     stretch(p, error_of(p, k));
-    stretch(p, error_of(p, k) + tal_study_cell_of(p->s, k, p->m)->difference.error);
+    stretch(p, error_of(p, k) + bar_of(p, k));
     count++;
   }
   p->floor = median_of(p, false);
   p->unclear = median_of(p, true);
   stretch(p, p->floor);
   stretch(p, p->unclear);
-  stretch(p, tal_study_limit(p->s, p->m));
+  stretch(p, limit_of(p));
   if (p->high == 0)
     p->low = 0.1, p->high = 1; // every setting gives the reference's bits
   // What lies far below the noise means nothing.
@@ -95,29 +108,54 @@ static bool measure(picture *p) {
 
 // ---- frame ----
 
+// Ticks at 1, 2 and 5 times the powers of ten; at the powers alone over more than three of them.
+static void ticks(FILE *out, char axis, double low, double high) {
+  static const double part[] = {1, 2, 5};
+  const bool few = high / low > 1000;
+  const char *comma = "";
+  fprintf(out, "set %ctics (", axis);
+  for (int power = (int)floor(log10(low)); power <= (int)ceil(log10(high)); power++)
+    for (int k = 0; k < (few ? 1 : 3); k++) {
+      const double value = part[k] * pow(10, power);
+      const bool plain = power >= -2 && power <= 3;
+      if (value < low || value > high)
+        continue;
+      if (plain)
+        fprintf(out, "%s'%g' %.9g", comma, value, value);
+      else if (k)
+        fprintf(out, "%s'%g·10^{%d}' %.9g", comma, part[k], power, value);
+      else
+        fprintf(out, "%s'10^{%d}' %.9g", comma, power, value);
+      comma = ", ";
+    }
+  fputs(")\n", out);
+}
+
 static void open_canvas(const picture *p, tal_plot *plot) {
   const tal_study *study = p->s->study;
   FILE *out = plot->script;
   tal_plot_canvas(plot, WIDTH, HEIGHT, FONT);
   fputs("set border 3 lw 2\nset tics nomirror out\nset grid lw 1.5 lc rgb '#dddddd' dt 1\nset logscale xy\n"
-        "set format '%h'\nset key noautotitle\nset label 1 ",
+        "set key noautotitle\nset label 1 ",
         out);
   tal_plot_text(out, study->name, 60);
   fprintf(out, " at screen 0.5, screen %.4f center noenhanced\n", 1 - 35.0 / HEIGHT);
-  fprintf(out, "set lmargin at screen 0.155\nset rmargin at screen 0.95\nset tmargin at screen %.4f\n",
+  fprintf(out, "set lmargin at screen 0.145\nset rmargin at screen 0.95\nset tmargin at screen %.4f\n",
           1 - 205.0 / HEIGHT);
   fprintf(out,
           "set bmargin at screen 0.13\nset key at screen 0.55, screen %.4f center center horizontal Left reverse "
           "samplen 2.5 maxrows 3 font ',%d' noenhanced\n",
           1 - 125.0 / HEIGHT, FONT - 5);
+  ticks(out, 'x', p->least, p->most);
+  ticks(out, 'y', p->low, p->high);
   fprintf(out, "set xrange [%.9g:%.9g]\nset yrange [%.9g:%.9g]\n", p->least, p->most, p->low, p->high);
   fprintf(out, "set xlabel 'cost: CPU seconds of a run%s'\n", study->cost_stage_count ? ", in the stages counted" : "");
   fputs("set ylabel ", out);
   const char *name = study->metrics[p->m].name;
   char text[120];
-  snprintf(text, sizeof text, "|error| of %.90s", name);
-  tal_plot_text(out, text, 60);
-  fputs(" noenhanced\n", out);
+  snprintf(text, sizeof text, "|error| of %.80s%s", name, p->scale == 1 ? "" : " (% of the reference)");
+  tal_plot_text(out, text, 70);
+  fprintf(out, " noenhanced font ',%d'\n", FONT - 2);
 }
 
 // A grey band from the foot of the axis up to `top`.
@@ -147,7 +185,7 @@ static void mark_reference(const picture *p, tal_plot *plot) {
 
 static void mark_limit(const picture *p, tal_plot *plot) {
   const tal_study_metric *metric = &p->s->study->metrics[p->m];
-  const double limit = tal_study_limit(p->s, p->m);
+  const double limit = limit_of(p);
   if (!(limit > 0))
     return;
   fprintf(plot->script,
@@ -175,16 +213,15 @@ static void name_points(const picture *p, tal_plot *plot) {
     fprintf(plot->script, "set label %d ", number);
     tal_plot_text(plot->script, study->dials[0].value[study->settings[k].value[0]].label, LABEL);
     fprintf(plot->script, " at %.9g, %.9g left offset 0.8,%s font ',%d' tc rgb '%s' front noenhanced\n",
-            p->s->lines[k].cpu_time, fmax(error_of(p, k), p->low * 1.12), number % 2 ? "-0.7" : "0.7", FONT - 6,
-            style[style_of(p, k)].colour);
+            p->s->lines[k].cpu_time, fmax(error_of(p, k), p->low * 1.12),
+            number % 2 && error_of(p, k) > 3 * p->low ? "-0.7" : "0.7", FONT - 6, style[style_of(p, k)].colour);
     number++;
   }
 }
 
 // x, y, low end and high end of the bar.
 static void put_point(const picture *p, FILE *data, size_t k) {
-  const tal_difference *d = &tal_study_cell_of(p->s, k, p->m)->difference;
-  const double error = error_of(p, k), bar = isfinite(d->error) ? d->error : 0;
+  const double error = error_of(p, k), bar = bar_of(p, k);
   fprintf(data, "%.9g %.9g %.9g %.9g\n", p->s->lines[k].cpu_time, fmax(error, p->low * 1.12), fmax(error - bar, p->low),
           fmax(error + bar, p->low));
 }

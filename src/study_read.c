@@ -232,8 +232,11 @@ static char *metric_name(const tal_study_metric *metric) {
   char text[200], window[80] = "";
   if (metric->take == TAL_TAKE_VALUE)
     snprintf(window, sizeof window, "_%g", metric->at);
-  else if (isfinite(metric->from) || isfinite(metric->to))
+  else if (isfinite(metric->from) && isfinite(metric->to))
     snprintf(window, sizeof window, "_%g_%g", metric->from, metric->to);
+  else if (isfinite(metric->from) || isfinite(metric->to))
+    snprintf(window, sizeof window, "_%s_%g", isfinite(metric->from) ? "from" : "to",
+             isfinite(metric->from) ? metric->from : metric->to);
   snprintf(text, sizeof text, "%.80s%s%s%s", metric->column ? metric->column : "", metric->column ? "_" : "",
            word[metric->take], window);
   return tal_strdup(text);
