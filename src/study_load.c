@@ -50,14 +50,37 @@ static bool read_tree(tal_study *study, tal_report *report) {
   return report->errors->count == 0;
 }
 
-// A key of the study is set there, any other in the scene of every run.
-static void apply_option(tal_study *study, const char *option, tal_report *report) {
+// Does --set name a key of the study (or nothing at all, which is reported there)?
+static bool is_of_study(const char *option) {
   char word[64];
   snprintf(word, sizeof word, "%.*s", (int)strcspn(option, ".[="), option);
-  if (!*word || !option[strcspn(option, "=")] || tal_schema_row(tal_study_keys(), word, NULL))
-    tal_scene_set(&study->tree, option, report);
-  else
-    tal_study_sets_add(&study->common, (tal_study_set){tal_tree_copy(&study->tree, option, strlen(option)), 0, true});
+  return !*word || !option[strcspn(option, "=")] || tal_schema_row(tal_study_keys(), word, NULL);
+}
+
+static bool same_key(const char *a, const char *b) {
+  const size_t length = strcspn(a, "=");
+  return length == strcspn(b, "=") && strncmp(a, b, length) == 0;
+}
+
+// A key of the scene, set in every run over what the study file says.
+static void add_option(tal_study *study, const char *option) {
+  const tal_study_set set = {tal_tree_copy(&study->tree, option, strlen(option)), 0, true};
+  for (size_t k = 0; k < study->common.count; k++)
+    if (same_key(study->common.item[k].text, option)) {
+      study->common.item[k] = set;
+      return;
+    }
+  tal_study_sets_add(&study->common, set);
+}
+
+// What a dial turns no option can hold still.
+static void check_options(const tal_study *study, tal_report *report) {
+  for (size_t k = 0; k < study->common.count; k++)
+    for (size_t s = 0; s < study->setting_count && study->common.item[k].option; s++)
+      for (size_t j = 0; j < study->settings[s].sets.count; j++)
+        if (same_key(study->common.item[k].text, study->settings[s].sets.item[j].text))
+          tal_report_text(report, 0, study->common.item[k].text, "",
+                          "a dial turns this key; accepted: other keys, or the dial: dials.0.values=[...]");
 }
 
 static void find_scene(tal_study *study, tal_report *report) {
@@ -311,17 +334,22 @@ static void load(tal_study *study, const char *const *sets, size_t set_count, ta
   if (!read_tree(study, report))
     return;
   for (size_t k = 0; k < set_count; k++)
-    apply_option(study, sets[k], report);
+    if (is_of_study(sets[k]))
+      tal_scene_set(&study->tree, sets[k], report);
   spell_out_reference(&study->tree);
   tal_schema_read(tal_study_keys(), study, study->tree.root, report);
   tal_schema_read_variants(tal_study_keys(), study, study->tree.root, report);
   find_scene(study, report);
   tal_study_read(study, report);
+  for (size_t k = 0; k < set_count; k++)
+    if (!is_of_study(sets[k]))
+      add_option(study, sets[k]);
   size_t reference[2] = {TAL_STUDY_OWN, TAL_STUDY_OWN};
   if (report->errors->count || (!study->reference.sets.count && !find_reference(study, reference, report)))
     return;
   make_settings(study, reference);
   check_ids(study, report);
+  check_options(study, report);
   if (!report->errors->count)
     make_runs(study, report);
 }

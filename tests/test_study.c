@@ -408,6 +408,15 @@ static void test_plan(void **state) {
     assert_non_null(strstr(text, "series_every: 0.1\n"));
     free(text);
   }
+  // --set goes over what the file sets.
+  const char *const ramp[] = {"stages.0.ramp=0.125"};
+  tal_study changed;
+  tal_scene_errors errors;
+  assert_int_equal(tal_study_load(&changed, f->study, ramp, 1, &errors), TAL_OK);
+  char *text = scene_text_of(&changed, 4, f->out);
+  assert_non_null(strstr(text, "ramp: 0.125\n"));
+  free(text);
+  tal_study_clear(&changed);
   // 0.25 s at 1e-5 s, then 10 s at 8e-6 s.
   assert_near(study.runs[0].steps, 0.25 / 1e-5 + 10 / 8e-6, 1e-6);
   assert_int_equal(tal_study_plan_write(&study, f->out, &err), TAL_OK);
@@ -526,10 +535,11 @@ static void test_messages(void **state) {
       fail_msg("expected '%s', got %zu: %s", wrong[k].says, errors.count, errors.item[0].text);
   }
   write_text(f->study, study_text);
-  const char *const options[] = {"seeds=none", "stages.4.rate=1", "stages.1.rate=fast"};
+  const char *const options[] = {"seeds=none", "stages.4.rate=1", "stages.1.rate=fast", "stages.1.integrator.dt=1"};
   const char *const says[] = {"--set seeds=none: seeds: gives no seeds", "--set stages.4.rate=1: stages: has 2 items",
-                              "--set stages.1.rate=fast: stages[1].rate: 'fast' is not a number"};
-  for (size_t k = 0; k < 3; k++) {
+                              "--set stages.1.rate=fast: stages[1].rate: 'fast' is not a number",
+                              "--set stages.1.integrator.dt=1: a dial turns this key"};
+  for (size_t k = 0; k < 4; k++) {
     tal_study study;
     tal_scene_errors errors;
     assert_int_equal(tal_study_load(&study, f->study, options + k, 1, &errors), TAL_BAD_INPUT);
