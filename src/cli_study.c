@@ -65,9 +65,23 @@ static tal_status run(const tal_study *study, const char *dir, const tal_cli_opt
   return tal_study_run_all(study, &plan, err);
 }
 
+// There must be a plan to merge by.
+static tal_status check_merge(const char *dir, const tal_cli_options *options, tal_error *err) {
+  char plan[TAL_PATH_SIZE];
+  tal_file_path(plan, dir, "plan.csv");
+  if (options->merge && options->plan)
+    return tal_fail(err, TAL_BAD_INPUT, "talus study: --merge: stands beside --plan; accepted: one of the two");
+  if (options->merge && !tal_file_exists(plan))
+    return tal_fail(err, TAL_BAD_INPUT, "talus study: --merge: %s holds no plan.csv; accepted: the folder of a study",
+                    dir);
+  return TAL_OK;
+}
+
 static int work(const tal_study *study, const char *dir, const tal_cli_options *options) {
   tal_error err = {""};
-  tal_status status = tal_study_plan_write(study, dir, &err);
+  tal_status status = check_merge(dir, options, &err);
+  if (status == TAL_OK)
+    status = tal_study_plan_write(study, dir, &err);
   if (status)
     return print_status(status, &err);
   if (options->plan) {

@@ -131,15 +131,26 @@ static void ticks(FILE *out, char axis, double low, double high) {
   fputs(")\n", out);
 }
 
+// Title, and what the marks are labelled with.
+static void put_title(const picture *p, FILE *out) {
+  const tal_study *study = p->s->study;
+  char text[200];
+  snprintf(text, sizeof text, "%.80s", study->name);
+  if (study->dials[0].key)
+    snprintf(text, sizeof text, "%.80s (marks: %.40s)", study->name, study->dials[0].name);
+  fputs("set label 1 ", out);
+  tal_plot_text(out, text, 64);
+  fprintf(out, " at screen 0.5, screen %.4f center noenhanced\n", 1 - 35.0 / HEIGHT);
+}
+
 static void open_canvas(const picture *p, tal_plot *plot) {
   const tal_study *study = p->s->study;
   FILE *out = plot->script;
   tal_plot_canvas(plot, WIDTH, HEIGHT, FONT);
   fputs("set border 3 lw 2\nset tics nomirror out\nset grid lw 1.5 lc rgb '#dddddd' dt 1\nset logscale xy\n"
-        "set key noautotitle\nset label 1 ",
+        "set key noautotitle\n",
         out);
-  tal_plot_text(out, study->name, 60);
-  fprintf(out, " at screen 0.5, screen %.4f center noenhanced\n", 1 - 35.0 / HEIGHT);
+  put_title(p, out);
   fprintf(out, "set lmargin at screen 0.145\nset rmargin at screen 0.95\nset tmargin at screen %.4f\n",
           1 - 205.0 / HEIGHT);
   fprintf(out,

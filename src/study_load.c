@@ -153,7 +153,8 @@ static void describe_setting(tal_study *study, tal_study_setting *setting) {
       tal_study_sets_add(&setting->sets, value->sets.item[k]);
   }
   setting->label = label;
-  setting->id = tal_words_slug(&study->tree, id);
+  // As a name of a folder it must fit one.
+  setting->id = tal_words_format(&study->tree, "%.120s", tal_words_slug(&study->tree, id));
 }
 
 static tal_study_setting *add_setting(tal_study *study) {

@@ -5,8 +5,8 @@
 #include "figures_data.h"
 #include "study.h"
 
-// A number from series.csv. Between rows the column is a straight line; a window's mean is the mean of that line. Rows
-// before the strain begins do not count. TAL_BAD_INPUT with the reason when the table does not hold it.
+// A number from series.csv. Between rows the column is a straight line; a window's mean is the mean of that line (S1).
+// Rows before the strain begins do not count. TAL_BAD_INPUT with the reason when the table does not hold it.
 tal_status tal_metric_of_series(const tal_study_metric *metric, const tal_table *series, double *value, tal_error *why);
 
 // Displacement fluctuations of the grains between two frames: displacement less the affine field fitted to it (least
@@ -24,8 +24,8 @@ tal_status tal_fluctuation_read(tal_fluctuation *out, const tal_study_metric *me
 // points: zero.
 void tal_fluctuation_of(const double *x, const double *y, double *dx, double *dy, size_t n);
 void tal_fluctuation_clear(tal_fluctuation *fluctuation);
-// sum a.b / sqrt(sum a.a sum b.b) over the grains in both: 1 for the same field, 0 in the mean for independent ones;
-// NAN when they share fewer than two grains or a field is zero.
+// (S6): sum a.b / sqrt(sum a.a sum b.b) over the grains in both: 1 for the same field, 0 in the mean for independent
+// ones; NAN when they share fewer than two grains or a field is zero.
 double tal_fluctuation_correlation(const tal_fluctuation *a, const tal_fluctuation *b);
 
 #endif

@@ -23,6 +23,8 @@
 enum { BAR = 20 };
 static const double patience = 10; // [s] for runs that another process is at work on
 
+static const int stopping[] = {SIGINT, SIGTERM, SIGUSR1};
+
 static volatile sig_atomic_t asked_to_stop;
 
 static void ask_to_stop(int number) {
@@ -46,7 +48,7 @@ typedef struct crew {
   double steps_ended, steps_todo;
   double started, shown; // [s]
   bool on_terminal;
-  struct sigaction old[2];
+  struct sigaction old[3];
 } crew;
 
 static double now(void) {
@@ -109,6 +111,9 @@ static void become(const char *program, char *const *argv, const char *log, pid_
   sigemptyset(&none);
   sigprocmask(SIG_SETMASK, &none, NULL);
   execv(program, argv);
+  static const char sorry[] = "the program cannot be started\n";
+  const ssize_t written = write(2, sorry, sizeof sorry - 1);
+  (void)written; // nobody is left to tell
   _exit(TAL_IO);
 }
 
@@ -164,9 +169,22 @@ static void show(crew *this, bool last) {
   fflush(stderr);
 }
 
+// Leaves in the log what the run itself could not say.
+static void note_signal(const crew *this, size_t r, int number) {
+  char log[TAL_PATH_SIZE + 16];
+  tal_study_log(log, sizeof log, this->options->dir, &this->study->runs[r]);
+  FILE *file = fopen(log, "a");
+  if (!file)
+    return;
+  fprintf(file, "ended by signal %d (%s)\n", number, strsignal(number));
+  fclose(file);
+}
+
 // Takes up what a child has come to. An interrupted one has not ended.
 static void settle(crew *this, worker *one, int result) {
   one->child = 0;
+  if (WIFSIGNALED(result))
+    note_signal(this, one->run, WTERMSIG(result));
   if (WIFEXITED(result) && WEXITSTATUS(result) == TAL_INTERRUPTED)
     return;
   this->ended++;
@@ -283,13 +301,13 @@ static void catch_signals(crew *this) {
   struct sigaction action = {.sa_handler = ask_to_stop};
   sigemptyset(&action.sa_mask);
   asked_to_stop = 0;
-  sigaction(SIGINT, &action, &this->old[0]);
-  sigaction(SIGTERM, &action, &this->old[1]);
+  for (int k = 0; k < 3; k++)
+    sigaction(stopping[k], &action, &this->old[k]);
 }
 
 static void release_signals(const crew *this) {
-  sigaction(SIGINT, &this->old[0], NULL);
-  sigaction(SIGTERM, &this->old[1], NULL);
+  for (int k = 0; k < 3; k++)
+    sigaction(stopping[k], &this->old[k], NULL);
 }
 
 tal_status tal_study_run_all(const tal_study *study, const tal_study_options *options, tal_error *err) {

@@ -1,12 +1,12 @@
 // The statistics of a study: means over seeds, differences from the reference, what they exclude, the frontier. Plain
-// numbers; GSL's mean, deviation and Student's t.
+// numbers; GSL's mean, deviation and Student's t. Equations (S2)-(S5).
 #ifndef TAL_STUDY_STATS_H
 #define TAL_STUDY_STATS_H
 
 #include "base.h"
 #include <stdbool.h>
 
-// Mean over samples; NAN where n is too small.
+// Mean over samples (S2); NAN where n is too small.
 typedef struct tal_estimate {
   size_t n;
   double mean, error; // standard error sd / sqrt(n)
@@ -14,7 +14,7 @@ typedef struct tal_estimate {
 
 tal_estimate tal_estimate_of(const double *value, size_t n);
 
-// A setting against the reference.
+// A setting against the reference (S3), (S4).
 typedef struct tal_difference {
   bool paired;    // over the seeds common to both
   size_t n;       // common seeds, else the smaller number
@@ -22,7 +22,7 @@ typedef struct tal_difference {
   double error;   // standard error
   double freedom; // degrees of freedom: n - 1, or Welch's for unpaired samples
   double half;    // half width of the confidence interval: t(confidence, freedom) error
-  double bound;   // |mean| + half: a larger bias is excluded
+  double bound;   // |mean| + half: a larger bias is excluded (S5)
 } tal_difference;
 
 // Paired over seeds[] that both have (ascending, no value NAN), if there are at least two; else difference of means.

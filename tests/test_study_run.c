@@ -194,6 +194,24 @@ static void test_kill(void **state) {
   stop_and_go_on(*state, SIGKILL, -1);
 }
 
+// EXACT: a run killed by itself is a failed one, named with its signal; the next call takes it up again.
+static void test_killed_run(void **state) {
+  program *p = *state;
+  outcome got;
+  char list[64], command[200];
+  write_slow_study(p);
+  process child = program_start(p, slow, NULL);
+  wait_for_checkpoints(p);
+  snprintf(list, sizeof list, "/proc/%d/task/%d/children", (int)child.id, (int)child.id);
+  snprintf(command, sizeof command, "kill -KILL $(cut -d' ' -f1 %s)", list);
+  assert_int_equal(system(command), 0);
+  process_wait(&child, &got);
+  assert_outcome("study", &got, 3, "failed: ended by signal 9 (Killed)\n");
+  assert_int_equal(count_lines(got.err), 1);
+  program_run(p, slow, &got);
+  assert_outcome("gone on", &got, 0, "");
+}
+
 // EXACT: a run killed before its first checkpoint is begun anew; a second study in the folder is refused.
 static void test_rubble_and_lock(void **state) {
   program *p = *state;
@@ -225,6 +243,8 @@ static void test_refused(void **state) {
   assert_refused(p, "no seeds", WORDS("study", "study.yaml", "-o", "out"), 2, "study.yaml:6: seeds: gives no seeds");
   assert_refused(p, "no study", WORDS("study", "none.yaml", "-o", "out"), 2, "none.yaml: cannot be read");
   assert_refused(p, "option", WORDS("study", "study.yaml", "--resume"), 2, "--resume: is not an option here");
+  assert_refused(p, "nothing to merge", WORDS("study", "study.yaml", "-o", "out", "--merge", "--set", "seeds=2"), 2,
+                 "--merge: out holds no plan.csv");
   write_study(p, "fall", "fall");
   program_run(p, WORDS("study", "study.yaml", "-o", "out", "--plan"), &got);
   assert_outcome("plan", &got, 0, "");
@@ -234,9 +254,9 @@ static void test_refused(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      program_test(test_whole_study), program_test(test_batch), program_test(test_failing_runs),
-      program_test(test_stop),        program_test(test_kill),  program_test(test_rubble_and_lock),
-      program_test(test_refused),
+      program_test(test_whole_study), program_test(test_batch),      program_test(test_failing_runs),
+      program_test(test_stop),        program_test(test_kill),       program_test(test_rubble_and_lock),
+      program_test(test_refused),     program_test(test_killed_run),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
