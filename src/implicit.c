@@ -26,7 +26,6 @@ typedef struct block {
   double dx[BLOCK], dy[BLOCK];                       // centre i - centre j
   double ux[BLOCK], uy[BLOCK], wi[BLOCK], wj[BLOCK]; // velocity i - velocity j, spins
   double pn[BLOCK], pt[BLOCK];                       // impulses [N s] along n and t on i
-  double change[BLOCK];                              // of a friction force over its cap
 } block;
 
 // ---- bodies ---------------------------------------------------------------------------------------------------------
@@ -36,7 +35,7 @@ static void set_grains(const solve *s) {
   const tal_grains *g = &s->sim->grains;
   const double *gravity = s->sim->scene->gravity;
   const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
-  tal_implicit_body *body = s->system->body;
+  tal_implicit_body *body = s->system->lane.body;
 #pragma omp parallel for schedule(static) if (g->count > PARALLEL_FROM)
   for (size_t i = 0; i < g->count; i++) {
     const double kick = g->inverse_mass[i] > 0 ? s->kick : 0;
@@ -60,12 +59,12 @@ static void set_walls(const solve *s) {
     double x = g->x[slots->i[c]], y = g->y[slots->i[c]];
     tal_wall_point near = tal_wall_nearest(wall, x, y);
     tal_v4 velocity = {wall->vx, wall->vy, 0, 0};
-    s->system->body[g->count + c] = (tal_implicit_body){
+    s->system->lane.body[g->count + c] = (tal_implicit_body){
         {x - near.distance * near.nx, y - near.distance * near.ny, 0, 0}, .now = velocity, .before = velocity};
   }
 }
 
-TAL_KERNEL void fetch_places(block *b, const tal_implicit *m, size_t start, int count) {
+TAL_KERNEL void fetch_places(block *b, const tal_lanes *m, size_t start, int count) {
   for (int k = 0; k < count; k += 4) {
     tal_v4 r[4];
     for (int q = 0; q < 4; q++)
@@ -81,7 +80,7 @@ TAL_KERNEL tal_v4 meet(tal_v4 i, tal_v4 j) {
   return __builtin_shufflevector(__builtin_shufflevector(i - j, i, 0, 1, 6, 6), j, 0, 1, 2, 7);
 }
 
-TAL_KERNEL void fetch_velocities(block *b, const tal_implicit *m, size_t start, int count, bool before) {
+TAL_KERNEL void fetch_velocities(block *b, const tal_lanes *m, size_t start, int count, bool before) {
   for (int k = 0; k < count; k += 4) {
     tal_v4 r[4];
     for (int q = 0; q < 4; q++) {
@@ -97,7 +96,7 @@ TAL_KERNEL void fetch_velocities(block *b, const tal_implicit *m, size_t start, 
 }
 
 // Gives both bodies of each lane its impulses. Wall slots and fillers have bodies of their own.
-TAL_KERNEL void push(const block *b, tal_implicit *m, size_t start, int count) {
+TAL_KERNEL void push(const block *b, const tal_lanes *m, size_t start, int count) {
   const double *restrict nx = m->nx + start, *restrict ny = m->ny + start;
   const double *restrict mass_i = m->mass_i + start, *restrict mass_j = m->mass_j + start;
   const double *restrict inertia_i = m->inertia_i + start, *restrict inertia_j = m->inertia_j + start;
@@ -133,11 +132,11 @@ TAL_KERNEL void push(const block *b, tal_implicit *m, size_t start, int count) {
 }
 
 // Slip of i against j along t = (-ny, nx), eq (9).
-TAL_KERNEL double slip_of(const block *b, const tal_implicit *m, size_t lane, int k) {
+TAL_KERNEL double slip_of(const block *b, const tal_lanes *m, size_t lane, int k) {
   return m->nx[lane] * b->uy[k] - m->ny[lane] * b->ux[k] - (m->arm_i[lane] * b->wi[k] + m->arm_j[lane] * b->wj[k]);
 }
 
-TAL_KERNEL double approach_of(const block *b, const tal_implicit *m, size_t lane, int k) {
+TAL_KERNEL double approach_of(const block *b, const tal_lanes *m, size_t lane, int k) {
   return -(m->nx[lane] * b->ux[k] + m->ny[lane] * b->uy[k]);
 }
 
@@ -145,7 +144,7 @@ TAL_KERNEL double approach_of(const block *b, const tal_implicit *m, size_t lane
 
 // Geometry, elastic force and viscosity of a block, and the approach and slip it starts the kick with.
 TAL_KERNEL void see(const solve *s, block *b, size_t start, int count, unsigned effects) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   fetch_places(b, m, start, count);
   fetch_velocities(b, m, start, count, true);
 #pragma omp simd
@@ -173,7 +172,7 @@ TAL_KERNEL double within(double value, double cap) {
 
 // The forces of the last step, within today's bounds.
 TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effects) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
     const int32_t slot = m->slot[lane];
     const tal_contacts *slots = slot < 0 ? &s->sim->wall_contacts : &s->sim->pairs;
@@ -190,7 +189,7 @@ TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effec
 
 // Tangential stiffness now, and the spring's force after it has moved with the step [eqs (7)-(8)].
 TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned effects) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
     double touching = m->overlap[lane] > 0 ? m->overlap[lane] : 0, before = m->spring_stiffness[lane];
     double slope = effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(m->stiffness[lane], sqrt(touching))
@@ -206,7 +205,7 @@ TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned e
 }
 
 TAL_KERNEL void begin_block(const solve *s, size_t start, int count, unsigned effects) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   see(s, &b, start, count, effects);
   remember(s, start, count, effects);
@@ -224,47 +223,52 @@ TAL_KERNEL void begin_block(const solve *s, size_t start, int count, unsigned ef
 
 // The forces that are right if nothing else changes; the largest change of a friction force over its cap.
 TAL_KERNEL double correct_block(const solve *s, size_t start, int count, unsigned effects) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   block b;
-  double free[BLOCK], given[BLOCK], brake[BLOCK], slip[BLOCK], share[BLOCK] = {0}, largest = 0;
+  const double kick = s->kick, inverse_vR = s->inverse_vR;
+  const bool advances = s->advances;
+  double free[BLOCK], given[BLOCK], brake[BLOCK], slip[BLOCK], share[BLOCK] = {0}, part[BLOCK], largest = 0;
   fetch_velocities(&b, m, start, count, false);
 #pragma omp simd
   for (int k = 0; k < count; k++) {
     const size_t lane = start + (size_t)k;
-    double yield = 0.5 * s->kick * (m->mass_i[lane] + m->mass_j[lane]);
+    double yield = 0.5 * kick * (m->mass_i[lane] + m->mass_j[lane]);
     double mean = 0.5 * (m->approach[lane] + approach_of(&b, m, lane, k)) + yield * m->fn[lane];
     double fn = m->overlap[lane] > 0 ? tal_implicit_normal(m->elastic[lane], m->viscosity[lane], mean, yield) : 0;
-    given[k] = s->kick * (m->mass_i[lane] + m->mass_j[lane] + m->arm_i[lane] * m->arm_i[lane] * m->inertia_i[lane] +
-                          m->arm_j[lane] * m->arm_j[lane] * m->inertia_j[lane]);
+    given[k] = kick * (m->mass_i[lane] + m->mass_j[lane] + m->arm_i[lane] * m->arm_i[lane] * m->inertia_i[lane] +
+                       m->arm_j[lane] * m->arm_j[lane] * m->inertia_j[lane]);
     free[k] = slip_of(&b, m, lane, k) - given[k] * m->ft[lane];
-    brake[k] = given[k] * m->friction[lane] * fn * s->inverse_vR;
-    slip[k] = fabs(free[k]) * s->inverse_vR;
-    b.pn[k] = s->kick * (fn - m->fn[lane]);
+    brake[k] = given[k] * m->friction[lane] * fn * inverse_vR;
+    slip[k] = fabs(free[k]) * inverse_vR;
+    b.pn[k] = kick * (fn - m->fn[lane]);
     m->fn[lane] = fn;
   }
   if (effects & TAL_EFFECT_REGULARISED)
     tal_implicit_shares(slip, brake, share, count, s->exponent);
-#pragma omp simd reduction(max : largest)
+#pragma omp simd
   for (int k = 0; k < count; k++) {
     const size_t lane = start + (size_t)k;
     double cap = m->friction[lane] * m->fn[lane], force = free[k] > 0 ? -(cap * share[k]) : cap * share[k];
     if (effects & TAL_EFFECT_SPRING) {
-      double moved = tal_implicit_spring(m->spring[lane], m->spring_stiffness[lane] * s->kick, free[k], m->slip[lane],
-                                         given[k], cap);
-      force = s->advances ? moved : within(m->spring[lane], cap);
+      double moved =
+          tal_implicit_spring(m->spring[lane], m->spring_stiffness[lane] * kick, free[k], m->slip[lane], given[k], cap);
+      force = advances ? moved : within(m->spring[lane], cap);
     }
-    double change = force - m->ft[lane], part = cap > 0 ? fabs(change) / cap : 0;
-    b.pt[k] = s->kick * change;
+    double change = force - m->ft[lane];
+    b.pt[k] = kick * change;
     m->ft[lane] = force;
-    largest = part > largest ? part : largest;
+    part[k] = fabs(change) / (cap > 0 ? cap : 1);
   }
+#pragma omp simd reduction(max : largest)
+  for (int k = 0; k < count; k++)
+    largest = part[k] > largest ? part[k] : largest;
   push(&b, m, start, count);
   return largest;
 }
 
 // Takes the share `factor` of all friction off (negative) or adds it, leaving the forces as they are noted.
 TAL_KERNEL double press_block(const solve *s, size_t start, int count, double factor) {
-  tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   for (int k = 0; k < count; k++) {
     b.pn[k] = 0;
@@ -276,7 +280,7 @@ TAL_KERNEL double press_block(const solve *s, size_t start, int count, double fa
 
 // Work of friction over the kick [J]: each force times the mean of the slips at both ends.
 TAL_KERNEL double work_of_block(const solve *s, size_t start, int count) {
-  const tal_implicit *m = s->system;
+  const tal_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   double work = 0;
   fetch_velocities(&b, m, start, count, false);
@@ -321,6 +325,20 @@ static double take_variant(const solve *s, pass what, size_t start, int count, d
   }
 }
 
+// Blocks of one colour. A parallel region costs a small sample more than its work, even when it is told to be none.
+static void take_colour(const solve *s, pass what, size_t from, size_t to, size_t size, double factor, bool parallel) {
+  double *partial = s->system->partial;
+  if (!parallel) {
+    for (size_t start = from; start < to; start += size)
+      partial[(start - from) / size] =
+          take_variant(s, what, start, (int)(to - start < size ? to - start : size), factor);
+    return;
+  }
+#pragma omp parallel for schedule(static)
+  for (size_t start = from; start < to; start += size)
+    partial[(start - from) / size] = take_variant(s, what, start, (int)(to - start < size ? to - start : size), factor);
+}
+
 // One pass over all colours. WORK returns a sum, the others the largest of what the blocks return.
 static double sweep(const solve *s, pass what, double factor) {
   tal_implicit *m = s->system;
@@ -329,10 +347,7 @@ static double sweep(const solve *s, pass what, double factor) {
     const size_t from = m->first[colour], to = m->first[colour + 1];
     const bool serial = m->serial_last && colour + 1 == m->colour_count;
     const size_t size = serial ? TAL_IMPLICIT_VECTOR : BLOCK;
-#pragma omp parallel for schedule(static) if (to - from > PARALLEL_FROM && !serial)
-    for (size_t start = from; start < to; start += size)
-      m->partial[(start - from) / size] =
-          take_variant(s, what, start, (int)(to - start < size ? to - start : size), factor);
+    take_colour(s, what, from, to, size, factor, to - from > PARALLEL_FROM && !serial);
     for (size_t k = 0; k < (to - from + size - 1) / size; k++) {
       largest = m->partial[k] > largest ? m->partial[k] : largest;
       sum += m->partial[k];
@@ -348,7 +363,7 @@ static void take_down(const solve *s, double all) {
   sweep(s, PRESS, -1);
   double linear = sweep(s, WORK, 0), share = linear < 0 ? linear / (linear - all) : 0;
   for (size_t lane = 0; lane < m->lanes; lane++)
-    m->ft[lane] *= share;
+    m->lane.ft[lane] *= share;
   sweep(s, PRESS, 1);
 }
 
@@ -370,7 +385,7 @@ static void settle(const solve *s, const tal_scene_integrator *plan) {
 
 // ---- answers --------------------------------------------------------------------------------------------------------
 
-static void answer_wall(tal_contacts *slots, const tal_implicit *m, size_t lane, size_t c) {
+static void answer_wall(tal_contacts *slots, const tal_lanes *m, size_t lane, size_t c) {
   slots->nx[c] = m->nx[lane];
   slots->ny[c] = m->ny[lane];
   slots->overlap[c] = m->overlap[lane];
@@ -379,7 +394,7 @@ static void answer_wall(tal_contacts *slots, const tal_implicit *m, size_t lane,
   slots->ft[c] = m->ft[lane];
 }
 
-static void answer_pair(tal_force_record *f, const tal_implicit *m, size_t lane) {
+static void answer_pair(tal_force_record *f, const tal_lanes *m, size_t lane) {
   double nx = m->nx[lane], ny = m->ny[lane], ft = m->ft[lane], viscous = m->fn[lane] - m->elastic[lane];
   *f = (tal_force_record){.elastic_x = m->elastic[lane] * nx,
                           .elastic_y = m->elastic[lane] * ny,
@@ -392,7 +407,7 @@ static void answer_pair(tal_force_record *f, const tal_implicit *m, size_t lane)
 }
 
 static void answer(const solve *s, size_t lane) {
-  const tal_implicit *m = s->system;
+  const tal_lanes *m = &s->system->lane;
   if (m->filler[lane])
     return;
   const bool wall = m->slot[lane] < 0, springs = s->effects & TAL_EFFECT_SPRING;

@@ -48,17 +48,21 @@ typedef struct tal_implicit_body {
   tal_v4 now, before;
 } tal_implicit_body;
 
-typedef struct tal_implicit {
-  tal_implicit_body *body; // owned; [body_capacity] grains, wall slots, one that nobody moves
-  size_t body_capacity;
-  size_t lanes, capacity;
+// Where all that lies. Loops take a copy of this, so that what they store cannot be taken for one of these pointers.
+typedef struct tal_lanes {
+  tal_implicit_body *body;                   // owned; [body_capacity] grains, wall slots, two that nobody moves
   int32_t *i, *j;                            // owned; [capacity] bodies
   int32_t *slot;                             // owned; [capacity] in sim->pairs; ~ of it in sim->wall_contacts
   bool *filler;                              // owned; [capacity] lanes that only fill a vector
-  double *partial;                           // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] work of each block
 #define X(name, unit, meaning) double *name; // owned; [capacity]
   TAL_LANE_FIELDS(X)
 #undef X
+} tal_lanes;
+
+typedef struct tal_implicit {
+  tal_lanes lane;
+  size_t lanes, capacity, body_capacity;
+  double *partial; // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] what each block of a colour returned
   size_t colour_count;
   size_t first[66]; // first lane of each colour
   bool serial_last; // the last colour holds what found no free one, a vector each: swept in order by one thread

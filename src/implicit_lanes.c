@@ -14,39 +14,38 @@ void tal_implicit_init(tal_implicit *system) {
   *system = (tal_implicit){0};
 }
 
-void tal_implicit_clear(tal_implicit *system) {
-  free(system->body);
-  free(system->i);
-  free(system->j);
-  free(system->slot);
-  free(system->filler);
+static void free_all(tal_implicit *system) {
+  tal_lanes *m = &system->lane;
+  free(m->body);
+  free(m->i);
+  free(m->j);
+  free(m->slot);
+  free(m->filler);
   free(system->partial);
-#define X(name, unit, meaning) free(system->name);
+#define X(name, unit, meaning) free(m->name);
   TAL_LANE_FIELDS(X)
 #undef X
+}
+
+void tal_implicit_clear(tal_implicit *system) {
+  free_all(system);
   tal_implicit_init(system);
 }
 
 static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
-  if (bodies > s->body_capacity) {
-    free(s->body);
-    s->body_capacity = bodies + bodies / 16;
-    s->body = tal_alloc(s->body_capacity, sizeof *s->body);
-  }
-  if (lanes <= s->capacity)
+  if (bodies <= s->body_capacity && lanes <= s->capacity)
     return;
-  tal_implicit_body *body = s->body;
-  tal_implicit old = *s;
-  old.body = NULL;
-  tal_implicit_clear(&old);
-  s->body = body;
+  free_all(s);
+  s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
-  s->i = tal_alloc(s->capacity, sizeof *s->i);
-  s->j = tal_alloc(s->capacity, sizeof *s->j);
-  s->slot = tal_alloc(s->capacity, sizeof *s->slot);
-  s->filler = tal_alloc(s->capacity, sizeof *s->filler);
   s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_BLOCK + COLOURS + 2, sizeof *s->partial);
-#define X(name, unit, meaning) s->name = tal_alloc(s->capacity, sizeof *s->name);
+  tal_lanes *m = &s->lane;
+  m->body = tal_alloc(s->body_capacity, sizeof *m->body);
+  m->i = tal_alloc(s->capacity, sizeof *m->i);
+  m->j = tal_alloc(s->capacity, sizeof *m->j);
+  m->slot = tal_alloc(s->capacity, sizeof *m->slot);
+  m->filler = tal_alloc(s->capacity, sizeof *m->filler);
+#define X(name, unit, meaning) m->name = tal_alloc(s->capacity, sizeof *m->name);
   TAL_LANE_FIELDS(X)
 #undef X
 }
@@ -93,7 +92,7 @@ static size_t lay_out(tal_implicit *s, const uint8_t *colour, size_t count) {
   return lanes;
 }
 
-static void fill_lane(const tal_sim *sim, tal_implicit *s, size_t lane, int32_t slot) {
+static void fill_lane(const tal_sim *sim, const tal_lanes *s, size_t lane, int32_t slot) {
   const tal_grains *g = &sim->grains;
   const bool wall = slot < 0;
   const tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
@@ -117,7 +116,7 @@ static void fill_lane(const tal_sim *sim, tal_implicit *s, size_t lane, int32_t 
 }
 
 // A lane between two bodies that nobody moves, without radius.
-static void fill_rest(tal_implicit *s, size_t lane, int32_t nobody) {
+static void fill_rest(const tal_lanes *s, size_t lane, int32_t nobody) {
   s->i[lane] = nobody;
   s->j[lane] = nobody + 1;
   s->slot[lane] = 0;
@@ -145,14 +144,14 @@ void tal_implicit_list(tal_sim *sim) {
   reserve(s, grains + walls + 2, lanes);
   memcpy(next, s->first, sizeof next);
   s->lanes = lanes;
-  s->body[nobody].place = (tal_v4){1, 0, 0, 0}; // a unit apart
-  s->body[nobody + 1].place = (tal_v4){0, 0, 0, 0};
+  s->lane.body[nobody].place = (tal_v4){1, 0, 0, 0}; // a unit apart
+  s->lane.body[nobody + 1].place = (tal_v4){0, 0, 0, 0};
   for (size_t k = 0; k < lanes; k++)
-    fill_rest(s, k, nobody);
+    fill_rest(&s->lane, k, nobody);
   for (size_t k = 0; k < count; k++) {
     size_t lane = next[colour[k]];
     next[colour[k]] += colour[k] == COLOURS ? TAL_IMPLICIT_VECTOR : 1;
-    fill_lane(sim, s, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
+    fill_lane(sim, &s->lane, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
   }
   free(i);
   free(j);
