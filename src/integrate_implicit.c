@@ -9,13 +9,16 @@
 #include "effects.h"
 #include "forces.h"
 #include "friction.h"
+#include "walls_load.h"
 
 static void advance(tal_sim *sim) {
   tal_integrate_drift(sim, sim->dt);
   tal_forces_sweep(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     tal_friction_solve(sim, sim->dt, true);
-  tal_integrate_finish(sim);
+  tal_forces_finish_step(sim, sim->dt, tal_integrate_credit(sim));
+  if (sim->effects & TAL_EFFECT_WALLS)
+    tal_walls_take_loads(sim, sim->dt);
 }
 
 const tal_integrator tal_implicit_friction = {.name = "implicit_friction",

@@ -167,6 +167,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_friction_clear(&sim->sticking);
   free(sim->grain_records);
   free(sim->force_records);
+  free(sim->sums);
   tal_graph_clear(&sim->graph);
   free(sim);
 }
