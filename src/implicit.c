@@ -44,9 +44,9 @@ static void set_grains(const solve *s) {
       ax += g->bx[i] * g->inverse_mass[i];
       ay += g->by[i] * g->inverse_mass[i];
     }
-    body[i].place = (tal_v4){g->x[i], g->y[i], 0, 0};
-    body[i].before = (tal_v4){g->vx[i], g->vy[i], w, w};
-    body[i].now = body[i].before + (tal_v4){kick * ax, kick * ay, 0, 0};
+    body[i].place = (tal_lanes){g->x[i], g->y[i], 0, 0};
+    body[i].before = (tal_lanes){g->vx[i], g->vy[i], w, w};
+    body[i].now = body[i].before + (tal_lanes){kick * ax, kick * ay, 0, 0};
   }
 }
 
@@ -58,36 +58,36 @@ static void set_walls(const solve *s) {
     const tal_wall *wall = &s->sim->walls.wall[slots->j[c]];
     double x = g->x[slots->i[c]], y = g->y[slots->i[c]];
     tal_wall_point near = tal_wall_nearest(wall, x, y);
-    tal_v4 velocity = {wall->vx, wall->vy, 0, 0};
+    tal_lanes velocity = {wall->vx, wall->vy, 0, 0};
     s->system->lane.body[g->count + c] = (tal_implicit_body){
         {x - near.distance * near.nx, y - near.distance * near.ny, 0, 0}, .now = velocity, .before = velocity};
   }
 }
 
-TAL_KERNEL void fetch_places(block *b, const tal_lanes *m, size_t start, int count) {
+TAL_KERNEL void fetch_places(block *b, const tal_implicit_lanes *m, size_t start, int count) {
   for (int k = 0; k < count; k += 4) {
-    tal_v4 r[4];
+    tal_lanes r[4];
     for (int q = 0; q < 4; q++)
       r[q] = m->body[m->i[start + k + q]].place - m->body[m->j[start + k + q]].place;
-    tal_transpose4(r);
+    tal_lanes_turn(r);
     memcpy(b->dx + k, &r[0], sizeof r[0]);
     memcpy(b->dy + k, &r[1], sizeof r[1]);
   }
 }
 
 // i's velocity less j's; the spins of both.
-TAL_KERNEL tal_v4 meet(tal_v4 i, tal_v4 j) {
-  return __builtin_shufflevector(__builtin_shufflevector(i - j, i, 0, 1, 6, 6), j, 0, 1, 2, 7);
+TAL_KERNEL void meet(const tal_lanes *i, const tal_lanes *j, tal_lanes *out) {
+  *out = __builtin_shufflevector(__builtin_shufflevector(*i - *j, *i, 0, 1, 6, 6), *j, 0, 1, 2, 7);
 }
 
-TAL_KERNEL void fetch_velocities(block *b, const tal_lanes *m, size_t start, int count, bool before) {
+TAL_KERNEL void fetch_velocities(block *b, const tal_implicit_lanes *m, size_t start, int count, bool before) {
   for (int k = 0; k < count; k += 4) {
-    tal_v4 r[4];
+    tal_lanes r[4];
     for (int q = 0; q < 4; q++) {
       const tal_implicit_body *i = &m->body[m->i[start + k + q]], *j = &m->body[m->j[start + k + q]];
-      r[q] = before ? meet(i->before, j->before) : meet(i->now, j->now);
+      meet(before ? &i->before : &i->now, before ? &j->before : &j->now, &r[q]);
     }
-    tal_transpose4(r);
+    tal_lanes_turn(r);
     memcpy(b->ux + k, &r[0], sizeof r[0]);
     memcpy(b->uy + k, &r[1], sizeof r[1]);
     memcpy(b->wi + k, &r[2], sizeof r[2]);
@@ -96,7 +96,7 @@ TAL_KERNEL void fetch_velocities(block *b, const tal_lanes *m, size_t start, int
 }
 
 // Gives both bodies of each lane its impulses. Wall slots and fillers have bodies of their own.
-TAL_KERNEL void push(const block *b, const tal_lanes *m, size_t start, int count) {
+TAL_KERNEL void push(const block *b, const tal_implicit_lanes *m, size_t start, int count) {
   const double *restrict nx = m->nx + start, *restrict ny = m->ny + start;
   const double *restrict mass_i = m->mass_i + start, *restrict mass_j = m->mass_j + start;
   const double *restrict inertia_i = m->inertia_i + start, *restrict inertia_j = m->inertia_j + start;
@@ -113,7 +113,7 @@ TAL_KERNEL void push(const block *b, const tal_lanes *m, size_t start, int count
     wj[k] = -(arm_j[k] * b->pt[k] * inertia_j[k]);
   }
   for (int k = 0; k < count; k += 4) {
-    tal_v4 i[4], j[4];
+    tal_lanes i[4], j[4];
     memcpy(&i[0], xi + k, sizeof i[0]);
     memcpy(&i[1], yi + k, sizeof i[1]);
     memcpy(&i[2], wi + k, sizeof i[2]);
@@ -122,8 +122,8 @@ TAL_KERNEL void push(const block *b, const tal_lanes *m, size_t start, int count
     memcpy(&j[1], yj + k, sizeof j[1]);
     memcpy(&j[2], wj + k, sizeof j[2]);
     j[3] = j[2];
-    tal_transpose4(i);
-    tal_transpose4(j);
+    tal_lanes_turn(i);
+    tal_lanes_turn(j);
     for (int q = 0; q < 4; q++) {
       m->body[m->i[start + k + q]].now += i[q];
       m->body[m->j[start + k + q]].now += j[q];
@@ -132,11 +132,11 @@ TAL_KERNEL void push(const block *b, const tal_lanes *m, size_t start, int count
 }
 
 // Slip of i against j along t = (-ny, nx), eq (9).
-TAL_KERNEL double slip_of(const block *b, const tal_lanes *m, size_t lane, int k) {
+TAL_KERNEL double slip_of(const block *b, const tal_implicit_lanes *m, size_t lane, int k) {
   return m->nx[lane] * b->uy[k] - m->ny[lane] * b->ux[k] - (m->arm_i[lane] * b->wi[k] + m->arm_j[lane] * b->wj[k]);
 }
 
-TAL_KERNEL double approach_of(const block *b, const tal_lanes *m, size_t lane, int k) {
+TAL_KERNEL double approach_of(const block *b, const tal_implicit_lanes *m, size_t lane, int k) {
   return -(m->nx[lane] * b->ux[k] + m->ny[lane] * b->uy[k]);
 }
 
@@ -144,7 +144,7 @@ TAL_KERNEL double approach_of(const block *b, const tal_lanes *m, size_t lane, i
 
 // Geometry, elastic force and viscosity of a block, and the approach and slip it starts the kick with.
 TAL_KERNEL void see(const solve *s, block *b, size_t start, int count, unsigned effects) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   fetch_places(b, m, start, count);
   fetch_velocities(b, m, start, count, true);
 #pragma omp simd
@@ -172,7 +172,7 @@ TAL_KERNEL double within(double value, double cap) {
 
 // The forces of the last step, within today's bounds.
 TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
     const int32_t slot = m->slot[lane];
     const tal_contacts *slots = slot < 0 ? &s->sim->wall_contacts : &s->sim->pairs;
@@ -189,7 +189,7 @@ TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effec
 
 // Tangential stiffness now, and the spring's force after it has moved with the step [eqs (7)-(8)].
 TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
     double touching = m->overlap[lane] > 0 ? m->overlap[lane] : 0, before = m->spring_stiffness[lane];
     double slope = effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(m->stiffness[lane], sqrt(touching))
@@ -205,7 +205,7 @@ TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned e
 }
 
 TAL_KERNEL void begin_block(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   see(s, &b, start, count, effects);
   remember(s, start, count, effects);
@@ -223,7 +223,7 @@ TAL_KERNEL void begin_block(const solve *s, size_t start, int count, unsigned ef
 
 // The forces that are right if nothing else changes; the largest change of a friction force over its cap.
 TAL_KERNEL double correct_block(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   const double kick = s->kick, inverse_vR = s->inverse_vR;
   const bool advances = s->advances;
@@ -268,7 +268,7 @@ TAL_KERNEL double correct_block(const solve *s, size_t start, int count, unsigne
 
 // Takes the share `factor` of all friction off (negative) or adds it, leaving the forces as they are noted.
 TAL_KERNEL double press_block(const solve *s, size_t start, int count, double factor) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   for (int k = 0; k < count; k++) {
     b.pn[k] = 0;
@@ -280,7 +280,7 @@ TAL_KERNEL double press_block(const solve *s, size_t start, int count, double fa
 
 // Work of friction over the kick [J]: each force times the mean of the slips at both ends.
 TAL_KERNEL double work_of_block(const solve *s, size_t start, int count) {
-  const tal_lanes lanes = s->system->lane, *m = &lanes;
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   double work = 0;
   fetch_velocities(&b, m, start, count, false);
@@ -385,7 +385,7 @@ static void settle(const solve *s, const tal_scene_integrator *plan) {
 
 // ---- answers --------------------------------------------------------------------------------------------------------
 
-static void answer_wall(tal_contacts *slots, const tal_lanes *m, size_t lane, size_t c) {
+static void answer_wall(tal_contacts *slots, const tal_implicit_lanes *m, size_t lane, size_t c) {
   slots->nx[c] = m->nx[lane];
   slots->ny[c] = m->ny[lane];
   slots->overlap[c] = m->overlap[lane];
@@ -394,7 +394,7 @@ static void answer_wall(tal_contacts *slots, const tal_lanes *m, size_t lane, si
   slots->ft[c] = m->ft[lane];
 }
 
-static void answer_pair(tal_force_record *f, const tal_lanes *m, size_t lane) {
+static void answer_pair(tal_force_record *f, const tal_implicit_lanes *m, size_t lane) {
   double nx = m->nx[lane], ny = m->ny[lane], ft = m->ft[lane], viscous = m->fn[lane] - m->elastic[lane];
   *f = (tal_force_record){.elastic_x = m->elastic[lane] * nx,
                           .elastic_y = m->elastic[lane] * ny,
@@ -407,7 +407,7 @@ static void answer_pair(tal_force_record *f, const tal_lanes *m, size_t lane) {
 }
 
 static void answer(const solve *s, size_t lane) {
-  const tal_lanes *m = &s->system->lane;
+  const tal_implicit_lanes *m = &s->system->lane;
   if (m->filler[lane])
     return;
   const bool wall = m->slot[lane] < 0, springs = s->effects & TAL_EFFECT_SPRING;
@@ -429,6 +429,7 @@ void tal_implicit_solve(tal_sim *sim, double kick, bool advances) {
   const tal_scene_contact *law = &sim->scene->contact;
   if (sim->implicit.listed != sim->neighbours.rebuilds)
     tal_implicit_list(sim);
+  tal_forces_keep(sim);
   solve s = {.sim = sim,
              .system = &sim->implicit,
              .kick = kick,

@@ -44,12 +44,12 @@ struct tal_sim;
 // A grain, or what a wall slot meets: place and velocities (v, v, spin, spin), at the end of the kick with the forces
 // found so far and at its start.
 typedef struct tal_implicit_body {
-  tal_v4 place; // x, y [m]
-  tal_v4 now, before;
+  tal_lanes place; // x, y [m]
+  tal_lanes now, before;
 } tal_implicit_body;
 
 // Where all that lies. Loops take a copy of this, so that what they store cannot be taken for one of these pointers.
-typedef struct tal_lanes {
+typedef struct tal_implicit_lanes {
   tal_implicit_body *body;                   // owned; [body_capacity] grains, wall slots, two that nobody moves
   int32_t *i, *j;                            // owned; [capacity] bodies
   int32_t *slot;                             // owned; [capacity] in sim->pairs; ~ of it in sim->wall_contacts
@@ -57,10 +57,10 @@ typedef struct tal_lanes {
 #define X(name, unit, meaning) double *name; // owned; [capacity]
   TAL_LANE_FIELDS(X)
 #undef X
-} tal_lanes;
+} tal_implicit_lanes;
 
 typedef struct tal_implicit {
-  tal_lanes lane;
+  tal_implicit_lanes lane;
   size_t lanes, capacity, body_capacity;
   double *partial; // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] what each block of a colour returned
   size_t colour_count;

@@ -15,7 +15,7 @@ void tal_implicit_init(tal_implicit *system) {
 }
 
 static void free_all(tal_implicit *system) {
-  tal_lanes *m = &system->lane;
+  tal_implicit_lanes *m = &system->lane;
   free(m->body);
   free(m->i);
   free(m->j);
@@ -39,7 +39,7 @@ static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
   s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
   s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_BLOCK + COLOURS + 2, sizeof *s->partial);
-  tal_lanes *m = &s->lane;
+  tal_implicit_lanes *m = &s->lane;
   m->body = tal_alloc(s->body_capacity, sizeof *m->body);
   m->i = tal_alloc(s->capacity, sizeof *m->i);
   m->j = tal_alloc(s->capacity, sizeof *m->j);
@@ -92,7 +92,7 @@ static size_t lay_out(tal_implicit *s, const uint8_t *colour, size_t count) {
   return lanes;
 }
 
-static void fill_lane(const tal_sim *sim, const tal_lanes *s, size_t lane, int32_t slot) {
+static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t lane, int32_t slot) {
   const tal_grains *g = &sim->grains;
   const bool wall = slot < 0;
   const tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
@@ -116,7 +116,7 @@ static void fill_lane(const tal_sim *sim, const tal_lanes *s, size_t lane, int32
 }
 
 // A lane between two bodies that nobody moves, without radius.
-static void fill_rest(const tal_lanes *s, size_t lane, int32_t nobody) {
+static void fill_rest(const tal_implicit_lanes *s, size_t lane, int32_t nobody) {
   s->i[lane] = nobody;
   s->j[lane] = nobody + 1;
   s->slot[lane] = 0;
@@ -144,8 +144,8 @@ void tal_implicit_list(tal_sim *sim) {
   reserve(s, grains + walls + 2, lanes);
   memcpy(next, s->first, sizeof next);
   s->lanes = lanes;
-  s->lane.body[nobody].place = (tal_v4){1, 0, 0, 0}; // a unit apart
-  s->lane.body[nobody + 1].place = (tal_v4){0, 0, 0, 0};
+  s->lane.body[nobody].place = (tal_lanes){1, 0, 0, 0}; // a unit apart
+  s->lane.body[nobody + 1].place = (tal_lanes){0, 0, 0, 0};
   for (size_t k = 0; k < lanes; k++)
     fill_rest(&s->lane, k, nobody);
   for (size_t k = 0; k < count; k++) {

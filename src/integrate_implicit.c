@@ -10,6 +10,7 @@
 #include "effects.h"
 #include "forces.h"
 #include "implicit.h"
+#include "walls_load.h"
 
 static void advance(tal_sim *sim) {
   tal_integrate_drift(sim, sim->dt);
@@ -17,7 +18,9 @@ static void advance(tal_sim *sim) {
     tal_implicit_solve(sim, sim->dt, true);
   else
     tal_forces_sweep(sim, sim->dt);
-  tal_integrate_finish(sim);
+  tal_forces_finish_step(sim, sim->dt, tal_integrate_credit(sim));
+  if (sim->effects & TAL_EFFECT_WALLS)
+    tal_walls_take_loads(sim, sim->dt);
 }
 
 const tal_integrator tal_implicit_friction = {

@@ -172,6 +172,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_implicit_clear(&sim->implicit);
   free(sim->grain_records);
   free(sim->force_records);
+  free(sim->sums);
   tal_graph_clear(&sim->graph);
   free(sim);
 }

@@ -125,7 +125,10 @@ struct tal_sim {
   tal_contacts wall_contacts; // grain-wall slots
   tal_walls walls;
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
-  tal_force_record *force_records; // owned; [pairs.capacity] what they answer
+  tal_force_record *force_records; // owned; [force_capacity] what they answer, per slot, where it is kept
+  tal_force_record *sums;          // owned; [sums_capacity] rings of the hot loop, zero between steps
+  size_t force_capacity, sums_capacity;
+  bool forces_kept; // the force records are those of the last step or sweep
   tal_neighbours neighbours;
   tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;
