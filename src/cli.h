@@ -14,6 +14,7 @@
 // Each gets the words after the command word (argv[0] is the first of them) and returns the exit code.
 int tal_cli_run(int argc, char **argv);
 int tal_cli_check(int argc, char **argv);
+int tal_cli_impact(int argc, char **argv);
 int tal_cli_plot(int argc, char **argv);
 int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);

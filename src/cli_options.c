@@ -11,6 +11,8 @@ static const tal_command commands[] = {
     {"run", "SCENE.yaml [-o DIR] [-t THREADS] [--set KEY=VALUE]... [--resume] [-q] [--no-figures]",
      "run a scene; series, fields, checkpoints and figures go to DIR", tal_cli_run},
     {"check", "SCENE.yaml [--set KEY=VALUE]...", "validate a scene and print what a run of it would do", tal_cli_check},
+    {"impact", "SCENE.yaml [-o DIR] [--set KEY=VALUE]... [--no-figures]",
+     "restitution and contact time of two mean grains over the damping: impact.csv, impact.png", tal_cli_impact},
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
     {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
      "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},

@@ -58,28 +58,34 @@ typedef struct job {
   double stage_started, stage_cpu_started;
   int64_t first_step;
   double wall_before, cpu_before; // [s] of the parts of the run before this one
+  double phi;                     // largest of the rows of stages with a rate
   int cores;
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-// What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
-static size_t warnings(const job *this, char text[200], const char *out[1]) {
+enum { WARNINGS = 2, WARNING_SIZE = 200 };
+
+// What the user should know about the accuracy of this run; count of sentences in `text`.
+static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
   double dt = tal_step_longest(this->sim);
-  if (!(dt > friction) || (this->sim->effects & TAL_EFFECT_IMPLICIT))
-    return 0;
-  snprintf(text, 200,
-           "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
-           dt, friction);
-  out[0] = text;
-  return 1;
+  size_t count = 0;
+  if (dt > friction && !(this->sim->effects & TAL_EFFECT_IMPLICIT))
+    snprintf(text[count++], WARNING_SIZE,
+             "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
+             dt, friction);
+  if (this->phi > TAL_QUASISTATIC_LIMIT)
+    snprintf(text[count++], WARNING_SIZE,
+             "phi reached %.3g: above %g the deformation is not quasi-static; lower mass_scaling or rate", this->phi,
+             TAL_QUASISTATIC_LIMIT);
+  return count;
 }
 
 static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
-  char text[200];
-  const char *sentences[1];
+  char text[WARNINGS][WARNING_SIZE];
+  const char *const sentences[WARNINGS] = {text[0], text[1]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
@@ -91,7 +97,7 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
                            .stages = this->stages,
                            .stage_count = this->scene->stage_count,
                            .warnings = sentences,
-                           .warning_count = warnings(this, text, sentences)};
+                           .warning_count = warnings(this, text)};
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
@@ -143,9 +149,21 @@ static bool due(const tal_sim *sim, double every) {
   return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
 }
 
+// phi of the row just taken where the stage has a rate, else 0. Not below the stage's pressure: a packing that is
+// compressed as it was made bears no stress at first.
+static double phi_now(const job *this) {
+  const tal_scene_stage *plan = tal_sim_stage(this->sim);
+  if (!plan || !(plan->rate > 0))
+    return 0;
+  double height = 2 * this->sim->constants.mean_radius / this->row.psi;
+  double pressure = fmax(0.5 * (this->row.sigma_xx + this->row.sigma_yy), plan->pressure);
+  return tal_quasistatic_coefficient(this->sim, plan->rate, pressure, height);
+}
+
 static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
+  this->phi = fmax(this->phi, phi_now(this));
   if ((status = tal_output_row(this->output, &this->row, err)))
     return status;
   if (fields && (status = tal_output_fields(this->output, this->sim, err)))

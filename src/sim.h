@@ -4,8 +4,8 @@
 
 #include "contacts.h"
 #include "continuum.h"
-#include "friction.h"
 #include "grains.h"
+#include "implicit.h"
 #include "neighbours.h"
 #include "pack.h"
 #include "records.h"
@@ -113,6 +113,8 @@ typedef struct tal_constants {
   double modulus;          // [Pa] young / (1 - poisson^2) of the grains
   double skin;             // [m]
   double tangential_ratio; // k_t / k_n of the spring law
+  // what contact.restitution asks for: beta or zeta of eqs (60), (5), NAN without it; [m/s] where Hertz delivers it
+  double damping_number, restitution_speed;
 } tal_constants;
 
 struct tal_sim {
@@ -125,7 +127,7 @@ struct tal_sim {
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
   tal_force_record *force_records; // owned; [pairs.capacity] what they answer
   tal_neighbours neighbours;
-  tal_friction_system sticking; // scratch of friction solved implicitly
+  tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;
   tal_run run;
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
