@@ -11,8 +11,7 @@
 void tal_forces_step(tal_sim *sim, double dt, double credit);
 
 // Forces of every slot from the grain records: force records of the grain-grain slots, nx ... ft of the wall slots. dt
-// [s] moves the tangential springs; 0: an observation, histories are left alone. Friction that is solved implicitly is
-// left out: tal_friction_solve adds it.
+// [s] moves the tangential springs; 0: an observation, histories are left alone.
 void tal_forces_sweep(tal_sim *sim, double dt);
 // Room for a record of every slot, which the caller fills.
 void tal_forces_keep(tal_sim *sim);
