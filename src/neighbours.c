@@ -217,6 +217,8 @@ void tal_neighbours_rebuild(tal_sim *sim) {
     sim->walls.wall[w].y_list = sim->walls.wall[w].y0;
   }
   list_all(sim);
+  sim->neighbours.moved = 0;
+  sim->neighbours.unseen = 0;
   for (size_t w = 0; w < sim->walls.count; w++)
     sim->walls.wall[w].listed = tal_wall_active(&sim->walls.wall[w], sim->run.time);
 }
@@ -224,6 +226,7 @@ void tal_neighbours_rebuild(tal_sim *sim) {
 void tal_neighbours_restore(tal_sim *sim) {
   sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
   list_all(sim);
+  sim->neighbours.moved = sim->constants.skin; // the next step has to look
 }
 
 // Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.
