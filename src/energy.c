@@ -88,7 +88,7 @@ void tal_energy_credit(tal_sim *sim, double weight) {
 // Accounts of the grains with the last instant counted half.
 static power grain_works(const tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  power sum = {0};
+  power sum = {.friction = sim->run.friction_work, .damping = sim->run.damping_work};
   double half = sim->stage && !sim->run.stage_done ? 0.5 * sim->dt : 0;
   for (size_t i = 0; i < g->count; i++) {
     power p = grain_power(sim, i);

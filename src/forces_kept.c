@@ -116,7 +116,9 @@ static void expand_pair(tal_sim *sim, size_t c) {
 
 void tal_forces_expand(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  if (!sim->forces_kept)
+  if (!sim->forces_kept && sim->effects & TAL_EFFECT_IMPLICIT)
+    tal_implicit_answer(sim);
+  else if (!sim->forces_kept)
     sweep_pairs(sim, 0);
   for (size_t c = 0; c < sim->pairs.count; c++)
     expand_pair(sim, c);

@@ -173,32 +173,29 @@ TAL_KERNEL double within(double value, double cap) {
 // The forces of the last step, within today's bounds.
 TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effects) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  for (size_t lane = start; lane < start + (size_t)count; lane++) {
-    const int32_t slot = m->slot[lane];
-    const tal_contacts *slots = slot < 0 ? &s->sim->wall_contacts : &s->sim->pairs;
-    const size_t c = (size_t)(slot < 0 ? ~slot : slot);
-    double fn = m->elastic[lane] + (effects & TAL_EFFECT_DAMPING ? slots->viscous[c] : 0);
-    m->fn[lane] = m->filler[lane] || !(m->overlap[lane] > 0) || !(fn > 0) ? 0 : fn;
-    m->ft[lane] = m->filler[lane] ? 0 : within(slots->spring[c], m->friction[lane] * m->fn[lane]);
-    if (effects & TAL_EFFECT_SPRING) {
-      m->spring[lane] = m->filler[lane] ? 0 : slots->spring[c];
-      m->spring_stiffness[lane] = m->filler[lane] ? 0 : slots->spring_stiffness[c];
-    }
+#pragma omp simd
+  for (int k = 0; k < count; k++) {
+    const size_t lane = start + (size_t)k;
+    double fn = m->elastic[lane] + (effects & TAL_EFFECT_DAMPING ? m->kept_viscous[lane] : 0);
+    fn = fn > 0 ? fn : 0;
+    m->fn[lane] = m->overlap[lane] > 0 ? fn : 0;
+    m->ft[lane] = within(m->kept_spring[lane], m->friction[lane] * m->fn[lane]);
   }
 }
 
 // Tangential stiffness now, and the spring's force after it has moved with the step [eqs (7)-(8)].
 TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned effects) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  for (size_t lane = start; lane < start + (size_t)count; lane++) {
-    double touching = m->overlap[lane] > 0 ? m->overlap[lane] : 0, before = m->spring_stiffness[lane];
+  const double kick = s->advances ? s->kick : 0, ratio = s->tangential_ratio;
+#pragma omp simd
+  for (int k = 0; k < count; k++) {
+    const size_t lane = start + (size_t)k;
+    double touching = m->overlap[lane] > 0 ? m->overlap[lane] : 0, before = m->kept_stiffness[lane];
     double slope = effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(m->stiffness[lane], sqrt(touching))
                                               : (touching > 0 ? m->stiffness[lane] : 0);
-    double stiffness = s->tangential_ratio * slope, spring = m->spring[lane];
-    if (stiffness < before)
-      spring *= stiffness / before;
-    if (s->advances)
-      spring -= stiffness * s->kick * m->slip[lane];
+    double stiffness = ratio * slope, spring = m->kept_spring[lane];
+    spring = stiffness < before ? spring * (stiffness / before) : spring;
+    spring -= stiffness * kick * m->slip[lane];
     m->spring_stiffness[lane] = stiffness;
     m->spring[lane] = within(spring, m->friction[lane] * m->fn[lane]);
   }
@@ -278,20 +275,41 @@ TAL_KERNEL double press_block(const solve *s, size_t start, int count, double fa
   return 0;
 }
 
-// Work of friction over the kick [J]: each force times the mean of the slips at both ends.
-TAL_KERNEL double work_of_block(const solve *s, size_t start, int count) {
+// Work over the kick: each force times the mean of the speeds at both ends.
+TAL_KERNEL tal_implicit_works work_of_block(const solve *s, size_t start, int count) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
-  double work = 0;
+  double friction[BLOCK], damping[BLOCK];
   fetch_velocities(&b, m, start, count, false);
+#pragma omp simd
   for (int k = 0; k < count; k++) {
     const size_t lane = start + (size_t)k;
-    work += m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
+    friction[k] = m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
+    damping[k] = (m->elastic[lane] - m->fn[lane]) * (m->approach[lane] + approach_of(&b, m, lane, k));
   }
-  return 0.5 * s->kick * work;
+  tal_implicit_works sum = {0, 0};
+  for (int k = 0; k < count; k++) {
+    sum.friction += friction[k];
+    sum.damping += damping[k];
+  }
+  return (tal_implicit_works){0.5 * s->kick * sum.friction, 0.5 * s->kick * sum.damping};
 }
 
-typedef enum pass { BEGIN, CORRECT, PRESS, WORK } pass;
+static tal_implicit_works work(const solve *s) {
+  tal_implicit *m = s->system;
+  const size_t blocks = (m->lanes + BLOCK - 1) / BLOCK;
+  tal_implicit_works sum = {0, 0};
+#pragma omp parallel for schedule(static) if (m->lanes > PARALLEL_FROM)
+  for (size_t k = 0; k < blocks; k++)
+    m->partial[k] = work_of_block(s, k * BLOCK, (int)(m->lanes - k * BLOCK < BLOCK ? m->lanes - k * BLOCK : BLOCK));
+  for (size_t k = 0; k < blocks; k++) {
+    sum.friction += m->partial[k].friction;
+    sum.damping += m->partial[k].damping;
+  }
+  return sum;
+}
+
+typedef enum pass { BEGIN, CORRECT, PRESS } pass;
 
 // The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
 #define VARIANTS(X)                                                                                                    \
@@ -305,10 +323,8 @@ TAL_KERNEL double take_block(const solve *s, pass what, size_t start, int count,
     return 0;
   case CORRECT:
     return correct_block(s, start, count, effects);
-  case PRESS:
-    return press_block(s, start, count, factor);
   default:
-    return work_of_block(s, start, count);
+    return press_block(s, start, count, factor);
   }
 }
 
@@ -325,62 +341,70 @@ static double take_variant(const solve *s, pass what, size_t start, int count, d
   }
 }
 
+// One block of the colour that begins at lane `from`.
+static void take(const solve *s, pass what, size_t from, size_t start, size_t to, size_t size, double factor) {
+  const int count = (int)(to - start < size ? to - start : size);
+  s->system->partial[(start - from) / size].friction = take_variant(s, what, start, count, factor);
+}
+
 // Blocks of one colour. A parallel region costs a small sample more than its work, even when it is told to be none.
 static void take_colour(const solve *s, pass what, size_t from, size_t to, size_t size, double factor, bool parallel) {
-  double *partial = s->system->partial;
   if (!parallel) {
     for (size_t start = from; start < to; start += size)
-      partial[(start - from) / size] =
-          take_variant(s, what, start, (int)(to - start < size ? to - start : size), factor);
+      take(s, what, from, start, to, size, factor);
     return;
   }
 #pragma omp parallel for schedule(static)
   for (size_t start = from; start < to; start += size)
-    partial[(start - from) / size] = take_variant(s, what, start, (int)(to - start < size ? to - start : size), factor);
+    take(s, what, from, start, to, size, factor);
 }
 
-// One pass over all colours. WORK returns a sum, the others the largest of what the blocks return.
+// One pass over all colours; the largest of what the blocks return.
 static double sweep(const solve *s, pass what, double factor) {
   tal_implicit *m = s->system;
-  double largest = 0, sum = 0;
+  double largest = 0;
   for (size_t colour = 0; colour < m->colour_count; colour++) {
     const size_t from = m->first[colour], to = m->first[colour + 1];
     const bool serial = m->serial_last && colour + 1 == m->colour_count;
     const size_t size = serial ? TAL_IMPLICIT_VECTOR : BLOCK;
     take_colour(s, what, from, to, size, factor, to - from > PARALLEL_FROM && !serial);
-    for (size_t k = 0; k < (to - from + size - 1) / size; k++) {
-      largest = m->partial[k] > largest ? m->partial[k] : largest;
-      sum += m->partial[k];
-    }
+    for (size_t k = 0; k < (to - from + size - 1) / size; k++)
+      largest = m->partial[k].friction > largest ? m->partial[k].friction : largest;
   }
   m->sweeps += what == CORRECT;
-  return what == WORK ? sum : largest;
+  return largest;
 }
 
 // With all friction taken down to the share x its work is x A + x^2 B, B > 0: nil at x = -A/B.
-static void take_down(const solve *s, double all) {
+static tal_implicit_works take_down(const solve *s, double all) {
   tal_implicit *m = s->system;
   sweep(s, PRESS, -1);
-  double linear = sweep(s, WORK, 0), share = linear < 0 ? linear / (linear - all) : 0;
+  double linear = work(s).friction, share = linear < 0 ? linear / (linear - all) : 0;
   for (size_t lane = 0; lane < m->lanes; lane++)
     m->lane.ft[lane] *= share;
   sweep(s, PRESS, 1);
+  return work(s);
 }
 
-static void settle(const solve *s, const tal_scene_integrator *plan) {
+// Sweeps; the work of a step.
+static tal_implicit_works settle(const solve *s, const tal_scene_integrator *plan) {
   int64_t sweeps = s->advances ? plan->sweeps : MORE_SWEEPS;
-  double change = 0, work = 0;
+  double change = 0;
   sweep(s, BEGIN, 0);
   for (int64_t k = 0; k < sweeps; k++)
     change = sweep(s, CORRECT, 0);
   for (int k = 0; k < MOST_SWEEPS && change > plan->tolerance; k++)
     change = sweep(s, CORRECT, 0);
-  if (!(s->effects & TAL_EFFECT_REGULARISED) || !s->advances)
-    return;
-  for (int k = 0; (work = sweep(s, WORK, 0)) > 0 && k < MORE_SWEEPS; k++)
+  if (!s->advances)
+    return (tal_implicit_works){0, 0};
+  tal_implicit_works done = work(s);
+  if (!(s->effects & TAL_EFFECT_REGULARISED))
+    return done;
+  for (int k = 0; done.friction > 0 && k < MORE_SWEEPS; k++) {
     sweep(s, CORRECT, 0);
-  if (work > 0)
-    take_down(s, work);
+    done = work(s);
+  }
+  return done.friction > 0 ? take_down(s, done.friction) : done;
 }
 
 // ---- answers --------------------------------------------------------------------------------------------------------
@@ -406,43 +430,107 @@ static void answer_pair(tal_force_record *f, const tal_implicit_lanes *m, size_t
                           .ft_half_overlap = ft * (m->radius_i[lane] - m->arm_i[lane])};
 }
 
-static void answer(const solve *s, size_t lane) {
-  const tal_implicit_lanes *m = &s->system->lane;
-  if (m->filler[lane])
-    return;
-  const bool wall = m->slot[lane] < 0, springs = s->effects & TAL_EFFECT_SPRING;
-  const size_t c = (size_t)(wall ? ~m->slot[lane] : m->slot[lane]);
-  tal_contacts *slots = wall ? &s->sim->wall_contacts : &s->sim->pairs;
-  if (wall)
-    answer_wall(slots, m, lane, c);
-  else
-    answer_pair(&s->sim->force_records[c], m, lane);
-  if (!s->advances)
-    return;
-  bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
-  slots->viscous[c] = m->fn[lane] - m->elastic[lane];
-  slots->spring[c] = springs && !slides ? m->spring[lane] : m->ft[lane];
-  slots->spring_stiffness[c] = m->spring_stiffness[lane];
+void tal_implicit_answer(tal_sim *sim) {
+  const tal_implicit *s = &sim->implicit;
+  const tal_implicit_lanes *m = &s->lane;
+  tal_forces_keep(sim);
+#pragma omp parallel for schedule(static) if (s->lanes > PARALLEL_FROM)
+  for (size_t lane = 0; lane < s->lanes; lane++)
+    if (!m->filler[lane] && m->slot[lane] >= 0)
+      answer_pair(&sim->force_records[m->slot[lane]], m, lane);
 }
 
-void tal_implicit_solve(tal_sim *sim, double kick, bool advances) {
-  const tal_scene_contact *law = &sim->scene->contact;
+static void answer_walls(const solve *s) {
+  const tal_implicit_lanes *m = &s->system->lane;
+  for (size_t k = 0; k < s->system->wall_lanes; k++) {
+    size_t lane = s->system->wall_lane[k];
+    answer_wall(&s->sim->wall_contacts, m, lane, (size_t)~m->slot[lane]);
+  }
+}
+
+// What the next step starts from.
+static void keep(const solve *s) {
+  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
+  const bool springs = s->effects & TAL_EFFECT_SPRING;
+#pragma omp simd
+  for (size_t lane = 0; lane < s->system->lanes; lane++) {
+    bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
+    m->kept_viscous[lane] = m->fn[lane] - m->elastic[lane];
+    m->kept_spring[lane] = springs && !slides ? m->spring[lane] : m->ft[lane];
+    m->kept_stiffness[lane] = m->spring_stiffness[lane];
+  }
+}
+
+static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
   if (sim->implicit.listed != sim->neighbours.rebuilds)
     tal_implicit_list(sim);
-  tal_forces_keep(sim);
   solve s = {.sim = sim,
              .system = &sim->implicit,
              .kick = kick,
              .inverse_vR = 1 / sim->constants.vR,
-             .exponent = law->exponent,
+             .exponent = sim->scene->contact.exponent,
              .tangential_ratio = sim->constants.tangential_ratio,
              .effects = sim->effects,
              .advances = advances};
+  const tal_scene_stage *stage = tal_sim_stage(sim);
   set_grains(&s);
   set_walls(&s);
-  const tal_scene_stage *stage = tal_sim_stage(sim);
-  settle(&s, stage ? &stage->integrator : &sim->scene->integrator);
-#pragma omp parallel for schedule(static) if (s.system->lanes > PARALLEL_FROM)
-  for (size_t lane = 0; lane < s.system->lanes; lane++)
-    answer(&s, lane);
+  tal_implicit_works done = settle(&s, stage ? &stage->integrator : &sim->scene->integrator);
+  answer_walls(&s);
+  if (advances)
+    keep(&s);
+  sim->forces_kept = false;
+  return done;
+}
+
+void tal_implicit_observe(tal_sim *sim) {
+  solve_all(sim, 0.5 * sim->dt, false);
+  tal_implicit_answer(sim);
+}
+
+// The bodies hold where the kick ends; the instant is in its middle.
+static void take_velocities(tal_sim *sim, double credit) {
+  tal_grains *g = &sim->grains;
+  const tal_implicit_body *body = sim->implicit.lane.body;
+  const double per_kick = 1 / sim->dt;
+  const bool spin = sim->effects & TAL_EFFECT_SPIN, boundary = sim->effects & TAL_EFFECT_BOUNDARY;
+#pragma omp parallel for schedule(static) if (g->count > PARALLEL_FROM)
+  for (size_t i = 0; i < g->count; i++) {
+    const tal_lanes mean = 0.5 * (body[i].before + body[i].now), change = per_kick * (body[i].now - body[i].before);
+    g->vx[i] = mean[0];
+    g->vy[i] = mean[1];
+    g->fx[i] = g->mass[i] * change[0];
+    g->fy[i] = g->mass[i] * change[1];
+    if (spin) {
+      g->omega[i] = mean[2];
+      g->torque[i] = g->inertia[i] * change[2];
+    }
+    if (boundary)
+      g->boundary_work[i] += credit * (g->bx[i] * mean[0] + g->by[i] * mean[1]);
+  }
+}
+
+// Books what the contacts did to the grains: a wall slot's part that goes with the wall is the wall's [eq (17)].
+static void book(tal_sim *sim, tal_implicit_works done, double credit) {
+  const tal_contacts *s = &sim->wall_contacts;
+  done.friction /= sim->dt;
+  done.damping /= sim->dt;
+  for (size_t c = 0; c < s->count; c++) {
+    const tal_wall *wall = &sim->walls.wall[s->j[c]];
+    done.friction += s->ft[c] * (s->nx[c] * wall->vy - s->ny[c] * wall->vx);
+    done.damping += s->fd[c] * (s->nx[c] * wall->vx + s->ny[c] * wall->vy);
+  }
+  sim->run.friction_work += credit * done.friction;
+  sim->run.damping_work += credit * done.damping;
+}
+
+void tal_implicit_step(tal_sim *sim, double credit) {
+  tal_implicit_works done = solve_all(sim, sim->dt, true);
+  if (sim->implicit.all_free) {
+    take_velocities(sim, credit);
+    book(sim, done, credit);
+    return;
+  }
+  tal_implicit_answer(sim); // what holds a grain has to know the forces on it
+  tal_forces_finish_step(sim, sim->dt, credit);
 }

@@ -22,6 +22,7 @@ static void free_all(tal_implicit *system) {
   free(m->slot);
   free(m->filler);
   free(system->partial);
+  free(system->wall_lane);
 #define X(name, unit, meaning) free(m->name);
   TAL_LANE_FIELDS(X)
 #undef X
@@ -38,6 +39,7 @@ static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
   free_all(s);
   s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
+  s->wall_lane = NULL;
   s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_BLOCK + COLOURS + 2, sizeof *s->partial);
   tal_implicit_lanes *m = &s->lane;
   m->body = tal_alloc(s->body_capacity, sizeof *m->body);
@@ -113,6 +115,9 @@ static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t la
   s->mass_j[lane] = wall ? 0 : g->inverse_mass[j];
   s->inertia_i[lane] = spin ? g->inverse_inertia[i] : 0;
   s->inertia_j[lane] = spin && !wall ? g->inverse_inertia[j] : 0;
+  s->kept_spring[lane] = slots->spring[c];
+  s->kept_stiffness[lane] = slots->spring_stiffness[c];
+  s->kept_viscous[lane] = slots->viscous[c];
 }
 
 // A lane between two bodies that nobody moves, without radius.
@@ -144,6 +149,9 @@ void tal_implicit_list(tal_sim *sim) {
   reserve(s, grains + walls + 2, lanes);
   memcpy(next, s->first, sizeof next);
   s->lanes = lanes;
+  free(s->wall_lane);
+  s->wall_lanes = walls;
+  s->wall_lane = tal_alloc(walls, sizeof *s->wall_lane);
   s->lane.body[nobody].place = (tal_lanes){1, 0, 0, 0}; // a unit apart
   s->lane.body[nobody + 1].place = (tal_lanes){0, 0, 0, 0};
   for (size_t k = 0; k < lanes; k++)
@@ -152,9 +160,32 @@ void tal_implicit_list(tal_sim *sim) {
     size_t lane = next[colour[k]];
     next[colour[k]] += colour[k] == COLOURS ? TAL_IMPLICIT_VECTOR : 1;
     fill_lane(sim, &s->lane, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
+    if (k >= pairs)
+      s->wall_lane[k - pairs] = lane;
   }
   free(i);
   free(j);
   free(colour);
+  s->all_free = true;
+  for (size_t g = 0; g < grains; g++)
+    s->all_free = s->all_free && sim->grains.inverse_mass[g] > 0 &&
+                  (sim->grains.inverse_inertia[g] > 0 || !(sim->effects & TAL_EFFECT_SPIN));
   s->listed = sim->neighbours.rebuilds;
+}
+
+void tal_implicit_save(tal_sim *sim) {
+  const tal_implicit *s = &sim->implicit;
+  const tal_implicit_lanes *m = &s->lane;
+  if (s->listed != sim->neighbours.rebuilds)
+    return;
+  for (size_t lane = 0; lane < s->lanes; lane++) {
+    if (m->filler[lane])
+      continue;
+    const bool wall = m->slot[lane] < 0;
+    tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
+    const size_t c = (size_t)(wall ? ~m->slot[lane] : m->slot[lane]);
+    slots->spring[c] = m->kept_spring[lane];
+    slots->spring_stiffness[c] = m->kept_stiffness[lane];
+    slots->viscous[c] = m->kept_viscous[lane];
+  }
 }

@@ -15,10 +15,9 @@
 static void advance(tal_sim *sim) {
   tal_integrate_drift(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_implicit_solve(sim, sim->dt, true);
+    tal_implicit_step(sim, tal_integrate_credit(sim));
   else
-    tal_forces_sweep(sim, sim->dt);
-  tal_forces_finish_step(sim, sim->dt, tal_integrate_credit(sim));
+    tal_forces_step(sim, sim->dt, tal_integrate_credit(sim));
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
 }

@@ -202,6 +202,7 @@ static void list_all(tal_sim *sim) {
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
     n->grain_capacity = g->count;
   }
+  tal_implicit_save(sim);
   list_pairs(sim);
   list_walls(sim);
   list_incidences(sim);

@@ -194,7 +194,7 @@ tal_observed tal_sim_observe(tal_sim *sim) {
     sim->boundary->apply(sim);
   tal_forces_see_now(sim);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_implicit_solve(sim, 0.5 * sim->dt, false);
+    tal_implicit_observe(sim);
   else
     tal_forces_sweep(sim, 0);
   return tal_sim_driving(sim);
