@@ -82,6 +82,8 @@ static int64_t drift_variant(tal_sim *sim, size_t start, int count, double dt) {
     return drift(&sim->grains, sim->grain_records, start, count, dt, 0);
   case TAL_EFFECT_SPIN:
     return drift(&sim->grains, sim->grain_records, start, count, dt, TAL_EFFECT_SPIN);
+  case TAL_EFFECT_SPIN | TAL_EFFECT_SPRING:
+    return drift(&sim->grains, sim->grain_records, start, count, dt, TAL_EFFECT_SPIN | TAL_EFFECT_SPRING);
   default:
     return drift(&sim->grains, sim->grain_records, start, count, dt, effects);
   }

@@ -77,24 +77,26 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
   }
 }
 
-// A biaxial test with either friction or none; the rest by the run-time mask.
+// Biaxial tests; the rest by the run-time mask.
+#define VARIANTS(X)                                                                                                    \
+  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN)                               \
+  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)                                    \
+  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING)                                                                          \
+  X(TAL_EFFECT_BOUNDARY)
+
 void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt, double credit) {
-  enum { biaxial = TAL_EFFECT_DAMPING | TAL_EFFECT_BOUNDARY };
-  const unsigned kinds = TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY |
-                         TAL_EFFECT_BOUNDARY | TAL_EFFECT_HELD;
+  const unsigned effects = sim->effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN |
+                                           TAL_EFFECT_GRAVITY | TAL_EFFECT_BOUNDARY | TAL_EFFECT_HELD);
   if (sim->effects & TAL_EFFECT_WALLS)
     add_walls(sim, sums, start, count);
-  switch (sim->effects & kinds) {
-  case biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN:
-    kick(sim, sums, start, count, dt, credit, biaxial | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN);
+  switch (effects) {
+#define X(mask)                                                                                                        \
+  case (mask):                                                                                                         \
+    kick(sim, sums, start, count, dt, credit, (mask));                                                                 \
     break;
-  case biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN:
-    kick(sim, sums, start, count, dt, credit, biaxial | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN);
-    break;
-  case biaxial:
-    kick(sim, sums, start, count, dt, credit, biaxial);
-    break;
+    VARIANTS(X)
+#undef X
   default:
-    kick(sim, sums, start, count, dt, credit, sim->effects & kinds);
+    kick(sim, sums, start, count, dt, credit, effects);
   }
 }
