@@ -1,6 +1,6 @@
-// See checkpoint.h. Groups: /run and /files (attributes), /frames, /grains, /contacts, /wall_contacts, /walls, /graph;
-// the scene is the text /scene. Slots are kept where history hangs on them (a spring); the others follow from the
-// centres.
+// See checkpoint.h. Groups: /run and /files (attributes), /frames, /grains, /contacts, /wall_contacts, /walls, /graph,
+// /minimal; the scene is the text /scene. Slots are kept where history hangs on them (a spring); the others follow from
+// the centres.
 #include "checkpoint.h"
 
 #include "files.h"
@@ -125,6 +125,12 @@ static void put_graph(tal_store *store, const tal_graph *graph) {
   tal_store_put(store, TAL_ARRAY("y", "m", graph->y, graph->grain_count));
 }
 
+// Forces by which a minimal boundary held its rows at the last step.
+static void put_multipliers(tal_store *store, const tal_rows *rows) {
+  tal_store_group(store, "minimal");
+  tal_store_put(store, TAL_ARRAY("multiplier", "Pa", (double *)rows->multiplier, TAL_ROWS_MOST));
+}
+
 tal_status tal_checkpoint_write(const char *path, const char *previous, const tal_sim *sim, const char *scene_text,
                                 const tal_run_files *files, tal_error *err) {
   tal_store store;
@@ -136,6 +142,7 @@ tal_status tal_checkpoint_write(const char *path, const char *previous, const ta
   put_contacts(&store, "wall_contacts", &sim->wall_contacts);
   put_walls(&store, &sim->walls);
   put_graph(&store, &sim->graph);
+  put_multipliers(&store, &sim->rows);
   return tal_store_save(&store, path, previous, err);
 }
 
@@ -345,6 +352,8 @@ tal_status tal_checkpoint_read(const char *path, tal_sim *sim, const char *scene
     get_contacts(&store, "wall_contacts", &sim->wall_contacts);
     get_walls(&store, &sim->walls);
     get_graph(&store, &sim->graph, sim->grains.count);
+    tal_store_group(&store, "minimal");
+    tal_store_get(&store, TAL_ARRAY("multiplier", NULL, sim->rows.multiplier, TAL_ROWS_MOST));
     check_slots(&store, sim);
     sim->run = head.run;
     *files = head.files;

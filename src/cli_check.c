@@ -64,8 +64,8 @@ static double planned_steps(const tal_scene *scene) {
     double duration = stage->duration > 0 ? stage->duration : 0;
     if (stage->ramp > 0)
       duration = 2 * stage->ramp;
-    if (stage->rate > 0)
-      duration = stage->strain / stage->rate;
+    if (stage->strain > 0)
+      duration = stage->strain / fabs(stage->rate);
     steps += duration / stage->integrator.dt;
   }
   return steps;
@@ -93,8 +93,8 @@ static double first_pressure(const tal_scene *scene) {
 
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0)
-      return scene->stages[s].rate;
+    if (fabs(scene->stages[s].rate) > 0)
+      return fabs(scene->stages[s].rate);
   return (double)NAN;
 }
 

@@ -51,7 +51,12 @@ void tal_integrate_drift(tal_sim *sim, double dt) {
 }
 
 void tal_integrate_finish(tal_sim *sim) {
-  tal_forces_finish_step(sim, sim->dt, 0.5 * (sim->dt + sim->dt_next));
+  const double credit = 0.5 * (sim->dt + sim->dt_next);
+  if (sim->boundary && sim->boundary->constrain) {
+    sim->boundary->constrain(sim, 0.5 * sim->dt, 0.5 * sim->dt_next);
+    sim->run.correcting_work += credit * sim->run.correcting_power;
+  }
+  tal_forces_finish_step(sim, sim->dt, credit);
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
 }

@@ -1,5 +1,7 @@
 #include "plates.h"
 
+#include "energy.h"
+
 #include <math.h>
 
 void tal_plates_ensure(tal_sim *sim) {
@@ -48,4 +50,22 @@ static void servo(tal_sim *sim, int side, double target, double speed_limit) {
 void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit) {
   for (int side = 1; side >= -1; side -= 2)
     servo(sim, side, pressure * sim->constants.thickness * width_at_plate(sim, side), speed_limit);
+}
+
+void tal_plates_remove(tal_sim *sim) {
+  const tal_contacts *slots = &sim->wall_contacts;
+  for (size_t c = 0; c < slots->count; c++) {
+    tal_wall *wall = &sim->walls.wall[slots->j[c]];
+    if (wall->plate != 0)
+      wall->work -= tal_energy_normal(sim, slots, c);
+  }
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    tal_wall *wall = &sim->walls.wall[w];
+    if (wall->plate == 0)
+      continue;
+    wall->plate = 0;
+    wall->until_time = wall->from_time;
+    wall->listed = 0; // its energy is booked
+    wall->vx = wall->vy = wall->fx = wall->fy = 0;
+  }
 }

@@ -2,6 +2,7 @@
 // at once is in scene_check.c.
 #include "scene_schema.h"
 
+#include "boundary_rows.h"
 #include "delaunay.h"
 
 #include <math.h>
@@ -38,7 +39,8 @@ FIXED_CHOICES(radius_choices, {"uniform", "every radius between min and max equa
 FIXED_CHOICES(lattice_choices, {"triangular", "six neighbours"}, {"square", "four neighbours"})
 FIXED_CHOICES(tessellation_choices, {"delaunay", "plain Delaunay triangulation of the centres"},
               {"power", "weighted by radius squared: touching disks always share an edge"})
-FIXED_CHOICES(cut_choices, {"circle", "grains whose centre lies inside a circle"})
+FIXED_CHOICES(cut_choices, {"circle", "grains whose centre lies inside a circle"},
+              {"polygon", "grains whose centre lies inside a polygon"})
 
 static size_t backend_choices(tal_choice *out, size_t capacity) {
   size_t count = 0;
@@ -145,11 +147,15 @@ static const tal_key wall_keys[] = {
      .help = "gone from this time on (a gate opens)"},
     {.name = NULL}};
 
-static const tal_key cut_keys[] = {
-    {KEY("shape", CHOICE), .fallback = "circle", CHOOSE(cut_choices), .help = "what is kept"},
-    {KEY("radius", REAL), .unit = "m", .required = true, POSITIVE, AT(tal_scene_pack, cut_radius),
-     .help = "of the circle"},
-    {.name = NULL}};
+static const tal_key cut_keys[] = {{KEY("shape", CHOICE), .fallback = "circle", CHOOSE(cut_choices),
+                                    AT(tal_scene_pack, cut_shape), .help = "what is kept"},
+                                   {KEY("radius", REAL), .unit = "m", ONLY("shape", "circle"), .required = true,
+                                    POSITIVE, AT(tal_scene_pack, cut_radius),
+                                    .help = "of the circle about the middle of the packing's box"},
+                                   {KEY("points", PAIRS), .unit = "m", ONLY("shape", "polygon"), .required = true,
+                                    FROM(3, 1000), COUNTED(tal_scene_pack, cut_points, cut_point_count),
+                                    .help = "corners [x, y] in order, from the middle of the packing's box"},
+                                   {.name = NULL}};
 
 static const tal_key pack_keys[] = {
     {KEY("method", CHOICE), .note = "drop_and_roll with count, none with list", CHOOSE(tal_packer_choices),
@@ -167,7 +173,7 @@ static const tal_key pack_keys[] = {
     {KEY("gap", REAL), .unit = "m", ONLY("method", "lattice"), .fallback = "0", ANY, AT(tal_scene_pack, gap),
      .help = "between neighbours; negative: overlap"},
     {KEY("cut", GROUP), .optional = true, .note = "none", .offset = 0, .size = sizeof(tal_scene_pack), .keys = cut_keys,
-     .help = "keeps only the grains inside"},
+     .help = "keeps only the grains inside; such a sample is confined without plates"},
     {.name = NULL}};
 
 static const tal_key refresh_keys[] = {
@@ -196,6 +202,8 @@ static const tal_key neighbours_keys[] = {
 static const tal_key limits_keys[] = {
     {KEY("overlap", REAL), .unit = "smaller radius", .fallback = "0.5", ABOVE_TO(0, 1), AT(tal_scene, overlap_limit),
      .help = "a deeper contact stops the run as invalid (exit 3), the last good checkpoint is kept"},
+    {KEY("outside", REAL), .unit = "grains", .fallback = "0.05", FROM(0, 1), AT(tal_scene, outside_limit),
+     .help = "a larger share of the grains outside a minimal boundary's loop stops the run as invalid"},
     {.name = NULL}};
 
 static const tal_key integrator_keys[] = {
@@ -237,10 +245,26 @@ static const tal_key stage_integrator_keys[] = {
      .help = "runs above the critical time step, at the user's risk"},
     {.name = NULL}};
 
+static const tal_key rate_keys[] = {
+    {KEY("xx", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, xx), .help = "dvx/dx"},
+    {KEY("yy", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, yy), .help = "dvy/dy"},
+    {KEY("xy", REAL), .unit = "1/s", .note = "0, unless stresses.xy is given", ANY, AT(tal_scene_rates, xy),
+     .help = "dvx/dy"},
+    {KEY("yx", REAL), .unit = "1/s", .note = "0, unless stresses.xy is given", ANY, AT(tal_scene_rates, yx),
+     .help = "dvy/dx"},
+    {.name = NULL}};
+
+static const tal_key stress_keys[] = {
+    {KEY("xx", REAL), .unit = "Pa", .note = "the pressure", ANY, AT(tal_scene_stresses, xx), .help = "on the sides"},
+    {KEY("yy", REAL), .unit = "Pa", .note = "the pressure", ANY, AT(tal_scene_stresses, yy),
+     .help = "on top and bottom"},
+    {KEY("xy", REAL), .unit = "Pa", .note = "shear is imposed", ANY, AT(tal_scene_stresses, xy), .help = "shear"},
+    {.name = NULL}};
+
 static const tal_key stage_keys[] = {
     {KEY("kind", CHOICE), .required = true, CHOOSE(tal_stage_choices), AT(tal_scene_stage, kind),
      .help = "what the stage does"},
-    {KEY("duration", REAL), .unit = "s", ONLY("kind", "free"), .required = true, POSITIVE,
+    {KEY("duration", REAL), .unit = "s", ONLY("kind", "free deform"), .required = true, POSITIVE,
      AT(tal_scene_stage, duration), .help = "ends after round(duration/dt) steps"},
     {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "confine"), .required = true, POSITIVE,
      AT(tal_scene_stage, pressure), .help = "isotropic pressure to reach"},
@@ -255,11 +279,28 @@ static const tal_key stage_keys[] = {
     {KEY("timeout", REAL), .unit = "s", ONLY("kind", "confine"), .note = "20 ramp + 20 s", POSITIVE,
      AT(tal_scene_stage, timeout), .help = "fails after this long, saying what was reached"},
     {KEY("boundary", CHOICE), ONLY("kind", "compress"), .fallback = "pressure", CHOOSE(tal_boundary_choices),
-     AT(tal_scene_stage, boundary), .help = "lateral boundary"},
-    {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "compress"), .note = "that of the last confine stage before",
-     POSITIVE, AT(tal_scene_stage, pressure), .help = "lateral pressure"},
+     AT(tal_scene_stage, boundary), .help = "lateral boundary, or minimal for no plates at all"},
+    {KEY("method", CHOICE), ONLY("kind", "compress shear deform"), .note = "exact with minimal boundaries",
+     CHOOSE(tal_method_choices), AT(tal_scene_stage, method), .help = "how minimal boundaries impose the strain rate"},
+    {KEY("penalty", REAL), .unit = "N m s", ONLY("kind", "compress shear deform"),
+     .note = "half the explicit limit when the stage begins", POSITIVE, AT(tal_scene_stage, penalty),
+     .help = "constant K of method: penalty; above the explicit limit the run stops"},
+    {KEY("order", WHOLE), ONLY("kind", "compress shear deform"), .note = "0 with minimal boundaries",
+     FROM(0, TAL_ORDER_MOST), AT(tal_scene_stage, order),
+     .help = "of minimal boundaries, method: exact: 0 uniform traction; higher orders hold the shape"},
+    {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "compress shear deform"),
+     .note = "that of the last confine stage before", POSITIVE, AT(tal_scene_stage, pressure),
+     .help = "lateral pressure; on all sides with minimal boundaries"},
     {KEY("rate", REAL), .unit = "1/s", ONLY("kind", "compress"), .required = true, POSITIVE, AT(tal_scene_stage, rate),
      .help = "rate of the engineering axial strain"},
+    {KEY("rate", REAL), .unit = "1/s", ONLY("kind", "shear"), .required = true, ANY, AT(tal_scene_stage, rate),
+     .help = "L_xy of simple shear; negative: the other way"},
+    {KEY("strain", REAL), ONLY("kind", "shear"), .required = true, POSITIVE, AT(tal_scene_stage, strain),
+     .help = "amount of shear strain that the stage adds, in the direction of the rate"},
+    {KEY("rates", GROUP), ONLY("kind", "deform"), .optional = true, .note = "none", AT(tal_scene_stage, rates),
+     .keys = rate_keys, .help = "imposed components of the mean velocity gradient"},
+    {KEY("stresses", GROUP), ONLY("kind", "deform"), .optional = true, .note = "the pressure",
+     AT(tal_scene_stage, stresses), .keys = stress_keys, .help = "stresses on the loop, compression positive"},
     {KEY("strain", REAL), ONLY("kind", "compress"), .required = true, INSIDE(0, 1), AT(tal_scene_stage, strain),
      .help = "engineering axial strain that the stage adds"},
     {KEY("integrator", GROUP), .optional = true, .note = "the scene's", AT(tal_scene_stage, integrator),

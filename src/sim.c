@@ -1,6 +1,7 @@
 #include "sim.h"
 
 #include "boundary.h"
+#include "boundary_minimal.h"
 #include "critical.h"
 #include "effects.h"
 #include "energy.h"
@@ -25,8 +26,8 @@ static double plane_modulus(double young, double poisson) {
 // The rate that sets vR: of the first stage that has one, NAN without.
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0)
-      return scene->stages[s].rate;
+    if (fabs(scene->stages[s].rate) > 0)
+      return fabs(scene->stages[s].rate);
   return (double)NAN;
 }
 
@@ -165,6 +166,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
   tal_friction_clear(&sim->sticking);
+  tal_rows_clear(&sim->rows);
   free(sim->grain_records);
   free(sim->force_records);
   tal_graph_clear(&sim->graph);
@@ -184,9 +186,9 @@ bool tal_sim_done(const tal_sim *sim) {
 }
 
 tal_observed tal_sim_observe(tal_sim *sim) {
+  tal_forces_see_now(sim);
   if (sim->boundary && sim->graph.valid)
     sim->boundary->apply(sim);
-  tal_forces_see_now(sim);
   tal_forces_sweep(sim, 0);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     tal_friction_solve(sim, 0.5 * sim->dt, false);
@@ -225,6 +227,21 @@ static double plate_load(const tal_sim *sim, int side) {
   return plate ? -side * plate->fy : (double)NAN;
 }
 
+static void row_minimal(const tal_sim *sim, tal_row *row) {
+  const double none = (double)NAN, *multiplier = sim->rows.multiplier;
+  const bool minimal = sim->boundary == &tal_boundary_minimal;
+  geo_tensor error = minimal ? tal_minimal_error(sim) : (geo_tensor){none, none, none, none};
+  row->multiplier_xx = minimal ? multiplier[TAL_XX] : none;
+  row->multiplier_yy = minimal ? multiplier[TAL_YY] : none;
+  row->multiplier_xy = minimal ? multiplier[TAL_XY] : none;
+  row->multiplier_spin = minimal ? multiplier[TAL_SPIN] : none;
+  row->strain_rate_error_xx = error.xx;
+  row->strain_rate_error_yy = error.yy;
+  row->strain_rate_error_xy = error.xy;
+  row->boundary_rank = minimal ? (double)sim->rows.rank : none;
+  row->outside = sim->graph.valid ? (double)sim->graph.loop.outside_count : none;
+}
+
 static void row_macro(const tal_macro *macro, tal_row *row) {
   row->sigma_xx = macro->stress.xx;
   row->sigma_yy = macro->stress.yy;
@@ -258,13 +275,15 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   int64_t grain;
   *row = (tal_row){.time = run->time, .step = (double)run->step, .stage = (double)run->stage};
   row->axial_strain = run->axial_strain;
+  row->shear_strain = run->shear_strain;
   row->volumetric_strain = volumetric_strain(sim);
   row_macro(&macro, row);
+  row_minimal(sim, row);
   row->plate_bottom = plate_load(sim, +1);
   row->plate_top = plate_load(sim, -1);
   tal_energy_row(sim, row);
   row->dt_ratio = tal_step_longest(sim) / tal_critical_step(sim);
-  double rate = plan && plan->rate > 0 ? plan->rate : first_rate(sim->scene);
+  double rate = plan && fabs(plan->rate) > 0 ? fabs(plan->rate) : first_rate(sim->scene);
   row->phi = tal_quasistatic_coefficient(sim, rate, 0.5 * (row->sigma_xx + row->sigma_yy), macro.height);
   row->psi = 2 * sim->constants.mean_radius / macro.height;
   row->overlap_max = tal_largest_overlap(sim, &grain);
@@ -281,6 +300,8 @@ void tal_sim_restored(tal_sim *sim) {
     if (plan->pressure > 0)
       sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");
   }
+  if (sim->boundary && sim->boundary->restored)
+    sim->boundary->restored(sim);
   tal_step_effects(sim);
   sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
   tal_neighbours_rebuild(sim);

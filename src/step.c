@@ -114,6 +114,11 @@ double tal_step_longest(const tal_sim *sim) {
 }
 
 static tal_status check_step(const tal_sim *sim, tal_error *err) {
+  if (sim->boundary && sim->boundary->check) {
+    tal_status status = sim->boundary->check(sim, err);
+    if (status)
+      return status;
+  }
   const tal_scene_stage *plan = tal_sim_stage(sim);
   double critical = tal_critical_step(sim);
   double longest = tal_step_longest(sim);
@@ -145,6 +150,7 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   run->stage_start = run->time;
   run->stage_done = 0;
   run->stage_begun = 1;
+  run->correcting_power = 0;
   tal_status status = sim->stage->begin(sim, plan, err);
   if (status)
     return status;
@@ -155,6 +161,12 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err)))
     return status;
   tal_sim_observe(sim);
+  if (sim->boundary && sim->boundary->constrain) {
+    sim->boundary->start(sim);
+    tal_sim_observe(sim);
+    sim->boundary->constrain(sim, 0, 0.5 * sim->dt);
+    tal_sim_driving(sim);
+  }
   tal_walls_take_loads(sim, 0);
   tal_energy_credit(sim, 0.5 * sim->dt);
   drive_with_observed(sim);
@@ -181,6 +193,7 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   run->refresh_area = geo_loop_area(&sim->graph.loop, g->x, g->y);
   run->refresh_step = run->step;
   run->refresh_strain = run->axial_strain;
+  run->refresh_shear = run->shear_strain;
   if (sim->boundary)
     sim->boundary->refreshed(sim);
   return TAL_OK;
@@ -201,7 +214,9 @@ static bool refresh_due(const tal_sim *sim) {
   int64_t steps = sim->run.step - sim->run.refresh_step;
   if (plan->refresh_steps > 0)
     return steps >= plan->refresh_steps;
-  if (!isnan(plan->refresh_strain) && sim->run.axial_strain - sim->run.refresh_strain >= plan->refresh_strain)
+  double strained =
+      fmax(fabs(sim->run.axial_strain - sim->run.refresh_strain), fabs(sim->run.shear_strain - sim->run.refresh_shear));
+  if (!isnan(plan->refresh_strain) && strained >= plan->refresh_strain)
     return true;
   // displacement is looked at every tenth step only; with a strain it is the confinement's criterion
   double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;
