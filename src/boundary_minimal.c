@@ -76,6 +76,20 @@ double tal_minimal_decay(const tal_rows *rows, const bool held[TAL_COMPONENTS], 
   return fmax(value[0], fmax(value[1], value[2]));
 }
 
+double tal_minimal_decay_planned(tal_sim *sim, const tal_scene_stage *plan) {
+  tal_boundary_target t = {0};
+  tal_rows rows;
+  if (tal_graph_refresh(&sim->graph, &sim->grains, NULL) != TAL_OK)
+    return (double)NAN;
+  tal_rows_init(&rows);
+  rows.thickness = sim->constants.thickness;
+  tal_stage_find(plan->kind)->target(sim, plan, &t);
+  tal_rows_refresh(&rows, &sim->graph.loop, sim->grains.x, sim->grains.y, sim->grains.inverse_mass, t.held, 0);
+  double decay = tal_minimal_decay(&rows, t.held, sim->grains.inverse_mass, &sim->graph.loop);
+  tal_rows_clear(&rows);
+  return decay;
+}
+
 double tal_minimal_penalty_limit(double decay, double dt, double critical) {
   return fmax(0, (1 / dt - 1 / critical) / decay);
 }
@@ -92,7 +106,7 @@ static void settle_on_loop(tal_sim *sim, const double *x, const double *y) {
   tal_boundary_target t = target_of(sim);
   sim->rows.thickness = sim->constants.thickness;
   tal_rows_refresh(&sim->rows, &sim->graph.loop, x, y, sim->grains.inverse_mass, t.held,
-                   (int)tal_sim_stage(sim)->order);
+                   exact(sim) ? (int)tal_sim_stage(sim)->order : 0);
 }
 
 static void refreshed(tal_sim *sim) {

@@ -23,6 +23,8 @@ geo_tensor tal_minimal_error(const tal_sim *sim);
 // the largest eigenvalue of (68).
 double tal_minimal_decay(const tal_rows *rows, const bool held[TAL_COMPONENTS], const double *inverse_mass,
                          const geo_loop *loop);
+// The same for a stage of the scene that has not begun, on a fresh graph of the grains as they are; NAN without one.
+double tal_minimal_decay_planned(tal_sim *sim, const tal_scene_stage *plan);
 // Largest K [N m s] that the step `dt` [s] bears beside contacts whose critical step is `critical` [s], (69).
 double tal_minimal_penalty_limit(double decay, double dt, double critical);
 

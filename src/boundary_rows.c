@@ -138,16 +138,16 @@ static void legendre(double s, int most, double *p, double *dp, double *ddp) {
   }
 }
 
-// Adds what the stress of every field does on a piece of edge k: at the point (x, y) with the outward normal times
-// length n, the share s of it at the edge's end (65).
+// Adds what the stress of every field does on a piece of edge k: at the point `at` from the box's centre, with the
+// outward normal times length n, the share s of it at the edge's end (65).
 static void add_point(const tal_rows *rows, double *field, const box *b, geo_vec at, geo_vec n, size_t k, double s,
                       int order) {
   double px[TAL_ORDER_MOST + 3], dx[TAL_ORDER_MOST + 3], ddx[TAL_ORDER_MOST + 3];
   double py[TAL_ORDER_MOST + 3], dy[TAL_ORDER_MOST + 3], ddy[TAL_ORDER_MOST + 3];
   const size_t next = k + 1 == rows->nodes ? 0 : k + 1, length = 2 * rows->nodes;
   const double slender = b->width / b->height; // sizes of the same order whatever the box
-  legendre((at.x - b->x) / b->width, order + 2, px, dx, ddx);
-  legendre((at.y - b->y) / b->height, order + 2, py, dy, ddy);
+  legendre(at.x / b->width, order + 2, px, dx, ddx);
+  legendre(at.y / b->height, order + 2, py, dy, ddy);
   for (int degree = 3; degree <= order + 2; degree++)
     for (int i = 0; i <= degree; i++, field += length) {
       const int j = degree - i;
@@ -164,7 +164,7 @@ static void add_point(const tal_rows *rows, double *field, const box *b, geo_vec
 static double *field_forces(const tal_rows *rows, const geo_loop *loop, const double *x, const double *y, int order) {
   double *field = tal_alloc(rows->fields * 2 * rows->nodes, sizeof *field);
   const box b = box_of(loop, x, y);
-  const size_t points = (size_t)(order / 2 + 1); // degree order + 1 along an edge
+  const size_t points = (size_t)(order + 3) / 2; // degree order + 1 along an edge
   gsl_integration_glfixed_table *gauss = gsl_integration_glfixed_table_alloc(points);
   for (size_t k = 0; k < rows->nodes; k++) {
     int32_t from = loop->node[k], to = loop->node[k + 1 == rows->nodes ? 0 : k + 1];
@@ -172,7 +172,7 @@ static double *field_forces(const tal_rows *rows, const geo_loop *loop, const do
     for (size_t g = 0; g < points; g++) {
       double s, weight;
       gsl_integration_glfixed_point(0, 1, g, &s, &weight, gauss);
-      geo_vec at = {x[from] + s * edge.x, y[from] + s * edge.y}, n = {weight * edge.y, -weight * edge.x};
+      geo_vec at = {x[from] - b.x + s * edge.x, y[from] - b.y + s * edge.y}, n = {weight * edge.y, -weight * edge.x};
       add_point(rows, field, &b, at, n, k, s, order);
     }
   }
@@ -202,9 +202,9 @@ static void subtract_column(gsl_matrix *a, size_t i, double share, const gsl_mat
     gsl_matrix_set(a, k, i, gsl_matrix_get(a, k, i) - share * gsl_matrix_get(b, k, j));
 }
 
-// Makes column i of a unit; returns 1 / its length, 0 where it has none.
-static double make_unit(gsl_matrix *a, size_t i) {
-  double length = sqrt(column_product(a, i, a, i)), inverse = length > 0 ? 1 / length : 0;
+// Makes column i of a unit; returns 1 / its length. One not longer than `least` is nothing: it becomes 0.
+static double make_unit(gsl_matrix *a, size_t i, double least) {
+  double length = sqrt(column_product(a, i, a, i)), inverse = length > least ? 1 / length : 0;
   for (size_t k = 0; k < a->size1; k++)
     gsl_matrix_set(a, k, i, gsl_matrix_get(a, k, i) * inverse);
   return inverse;
@@ -220,7 +220,7 @@ static void take_components_out(const tal_rows *rows, const bool held[TAL_COMPON
     for (size_t b = 0; b < c; b++)
       if (held[b])
         subtract_column(base, c, column_product(base, b, base, c), base, b);
-    make_unit(base, c);
+    make_unit(base, c, 0);
     for (int twice = 0; twice < 2; twice++)
       for (size_t j = 0; j < fields->size2; j++)
         subtract_column(fields, j, column_product(base, c, fields, j), base, c);
@@ -229,15 +229,17 @@ static void take_components_out(const tal_rows *rows, const bool held[TAL_COMPON
 }
 
 // Mixes the fields by the singular value decomposition of their weighted forces; keeps what is above the cutoff (66).
-static void keep_independent(tal_rows *rows, const double *field, const bool held[TAL_COMPONENTS], const double *root) {
+// `whole`: length of the longest field before its mean was taken out.
+static void keep_independent(tal_rows *rows, const double *field, double whole, const bool held[TAL_COMPONENTS],
+                             const double *root) {
   const size_t count = rows->fields, length = 2 * rows->nodes;
   gsl_matrix *matrix = weighted(rows, field, count, root), *right = gsl_matrix_alloc(count, count);
   gsl_vector *value = gsl_vector_alloc(count), *scale = gsl_vector_alloc(count), *work = gsl_vector_alloc(count);
   for (size_t j = 0; j < count; j++)
-    gsl_vector_set(scale, j, make_unit(matrix, j));
+    gsl_vector_set(scale, j, make_unit(matrix, j, 1e-9 * whole));
   take_components_out(rows, held, root, matrix);
   gsl_linalg_SV_decomp(matrix, right, value, work);
-  const double limit = TAL_ROWS_CUTOFF * gsl_vector_get(value, 0), size = rows->thickness * sqrt(rows->area);
+  const double limit = TAL_ROWS_CUTOFF * fmax(1, gsl_vector_get(value, 0)), size = rows->thickness * sqrt(rows->area);
   for (rows->rank = 0; rows->rank < count && gsl_vector_get(value, rows->rank) > limit; rows->rank++) {
     double *shape = rows->shape + rows->rank * length;
     memset(shape, 0, length * sizeof *shape);
@@ -251,6 +253,13 @@ static void keep_independent(tal_rows *rows, const double *field, const bool hel
   gsl_vector_free(value);
   gsl_matrix_free(right);
   gsl_matrix_free(matrix);
+}
+
+static double weighted_length(const tal_rows *rows, const double *row, const double *root) {
+  double sum = 0;
+  for (size_t k = 0; k < 2 * rows->nodes; k++)
+    sum += row[k] * root[k / 2] * row[k] * root[k / 2];
+  return sqrt(sum);
 }
 
 static void reserve(tal_rows *rows, size_t nodes, int order) {
@@ -276,13 +285,16 @@ void tal_rows_refresh(tal_rows *rows, const geo_loop *loop, const double *x, con
   if (!rows->fields)
     return;
   double *field = field_forces(rows, loop, x, y, order), *root = tal_alloc(rows->nodes, sizeof *root), most = 0;
-  for (size_t j = 0; j < rows->fields; j++)
-    take_mean_out(rows, loop, x, y, field + j * 2 * rows->nodes);
   for (size_t k = 0; k < rows->nodes; k++)
     most = fmax(most, inverse_mass[loop->node[k]]);
   for (size_t k = 0; k < rows->nodes && most > 0; k++)
     root[k] = sqrt(inverse_mass[loop->node[k]] / most);
-  keep_independent(rows, field, held, root);
+  double whole = 0;
+  for (size_t j = 0; j < rows->fields; j++) {
+    whole = fmax(whole, weighted_length(rows, field + j * 2 * rows->nodes, root));
+    take_mean_out(rows, loop, x, y, field + j * 2 * rows->nodes);
+  }
+  keep_independent(rows, field, whole, held, root);
   free(root);
   free(field);
 }

@@ -1,6 +1,7 @@
 // talus check SCENE.yaml [--set K=V]...: validates, packs, and prints what the run would be and cost. Writes nothing.
 #include "cli.h"
 
+#include "boundary_minimal.h"
 #include "critical.h"
 #include "effects.h"
 #include "integrate.h"
@@ -132,6 +133,22 @@ static void print_numbers(const tal_sim *sim) {
            tal_quasistatic_coefficient(sim, rate, pressure, height), 2 * k->mean_radius / height);
 }
 
+// What the explicit step lets a penalty be, for the loop of the packing; contacts take their share of it later.
+static void print_penalties(tal_sim *sim) {
+  for (size_t s = 0; s < sim->scene->stage_count; s++) {
+    const tal_scene_stage *stage = &sim->scene->stages[s];
+    if (!stage->method || strcmp(stage->method, "penalty") != 0)
+      continue;
+    const double dt = (double)tal_integrate_longest(&stage->integrator) * stage->integrator.dt;
+    double limit = tal_minimal_penalty_limit(tal_minimal_decay_planned(sim, stage), dt, (double)INFINITY);
+    printf("penalty       stage %zu: explicit limit K < %.4g N m s at dt = %g s, less what contacts take", s, limit, dt);
+    if (isnan(stage->penalty))
+      printf("; half of what is left is taken\n");
+    else
+      printf("; K is %.3g times that\n", stage->penalty / limit);
+  }
+}
+
 static void print_cost(tal_sim *sim) {
   double steps = planned_steps(sim->scene), grains = (double)sim->grains.count;
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
@@ -162,6 +179,7 @@ int tal_cli_check(int argc, char **argv) {
     printf("scene         %s: valid\n", options.argument);
     print_effects(sim);
     print_numbers(sim);
+    print_penalties(sim);
     print_cost(sim);
     tal_sim_free(sim);
   }

@@ -66,7 +66,6 @@ typedef struct tal_run {
   X(stage, "", "index of the stage, from 0")                                                                           \
   X(axial_strain, "", "engineering, compression positive")                                                             \
   X(volumetric_strain, "", "engineering, dilation positive, zero until the first compress")                            \
-  X(shear_strain, "", "integral of L_xy + L_yx under minimal boundaries")                                              \
   X(sigma_xx, "Pa", "stress of the assembly from contacts, compression positive")                                      \
   X(sigma_yy, "Pa", "stress of the assembly from contacts")                                                            \
   X(sigma_xy, "Pa", "stress of the assembly from contacts, symmetrised")                                               \
@@ -85,6 +84,7 @@ typedef struct tal_run {
   X(fabric_yy, "", "contact fabric")                                                                                   \
   X(mean_slip, "", "mean slip speed of touching pairs over vR")                                                        \
   X(unbalanced, "", "mean unbalanced force over mean contact force")                                                   \
+  X(shear_strain, "", "integral of L_xy + L_yx under minimal boundaries")                                              \
   X(multiplier_xx, "Pa", "stress by which minimal boundaries correct the imposed strain rate, beside the pressure")    \
   X(multiplier_yy, "Pa", "the same")                                                                                   \
   X(multiplier_xy, "Pa", "the same")                                                                                   \
