@@ -46,6 +46,7 @@ typedef struct wide_edge {
 typedef struct peeler {
   const geo_mesh *mesh;
   const double *x, *y, *radius;
+  const unsigned char *side; // or NULL
   double gap_limit;
   unsigned char *inside;  // [T] borrowed
   unsigned char *on_loop; // [points] is or was on the loop; no triangle inside asks about those that left it
@@ -58,6 +59,8 @@ static wide_edge edge_of(const peeler *p, int32_t t, int k) {
   int32_t i = a < b ? a : b, j = a < b ? b : a;
   double dx = p->x[j] - p->x[i], dy = p->y[j] - p->y[i];
   double gap = sqrt(dx * dx + dy * dy) - (p->radius[i] + p->radius[j]);
+  if (p->side && p->side[i] && p->side[i] == p->side[j])
+    gap = p->side[p->mesh->corner[t][k]] == p->side[i] ? (double)INFINITY : -(double)INFINITY;
   return (wide_edge){gap, i, j, t, k};
 }
 
@@ -161,8 +164,8 @@ static void trace(geo_loop *loop, const peeler *p) {
 }
 
 int geo_loop_peel(geo_loop *loop, const geo_mesh *mesh, const double *x, const double *y, const double *radius,
-                  double gap_limit, unsigned char *inside) {
-  peeler p = {.mesh = mesh, .x = x, .y = y, .radius = radius, .gap_limit = gap_limit, .inside = inside};
+                  const unsigned char *side, double gap_limit, unsigned char *inside) {
+  peeler p = {.mesh = mesh, .x = x, .y = y, .radius = radius, .side = side, .gap_limit = gap_limit, .inside = inside};
   p.on_loop = geo_zeroed(mesh->point_count, 1);
   memset(inside, 1, mesh->triangle_count);
   for (size_t t = 0; t < mesh->triangle_count; t++)

@@ -21,10 +21,12 @@ void geo_loop_set(geo_loop *loop, const int32_t *node, size_t count);
 // Peels: a boundary triangle is removed while its outer edge (i,j) has a gap |ij| - radius_i - radius_j > gap_limit
 // [length] and the removal keeps the boundary one simple loop. Longest gap first, ties by point index, so the result
 // does not depend on the order of triangles. A triangle with two outer edges goes only if both are that wide: then its
-// tip lies outside. Where only a triangle holds two parts together it stays, however wide.
-// inside[T]: set to 1 for kept triangles. Returns 0, or -1 when no triangle would be left (loop->count = 0).
+// tip lies outside. Where only a triangle holds two parts together it stays, however wide. side[points] or NULL: an
+// edge whose two points have the same mark other than 0 lies along a rigid side; its triangle goes if the third point
+// has that mark, too (the loop takes in every point at the side), and stays if not, however wide the edge. inside[T]:
+// set to 1 for kept triangles. Returns 0, or -1 when no triangle would be left (loop->count = 0).
 int geo_loop_peel(geo_loop *loop, const geo_mesh *mesh, const double *x, const double *y, const double *radius,
-                  double gap_limit, unsigned char *inside);
+                  const unsigned char *side, double gap_limit, unsigned char *inside);
 
 // Enclosed area [length^2] by the shoelace sum about the first node.
 double geo_loop_area(const geo_loop *loop, const double *x, const double *y);

@@ -15,6 +15,9 @@ struct tal_boundary {
   // `close` seconds up to the instant of the synchronised velocities, which the velocities as they stand lack, and for
   // `open` seconds from there on. NULL: nothing is imposed.
   void (*constrain)(tal_sim *sim, double close, double open);
+  // Beside constrain: corrects sim->implicit's velocities at the end of the kick, so that friction and damping that are
+  // solved for answer to what is imposed. `first` of a solve.
+  void (*couple)(tal_sim *sim, double kick, bool first);
   void (*restored)(tal_sim *sim);                          // a checkpoint was read; NULL: nothing to put back
   tal_status (*check)(const tal_sim *sim, tal_error *err); // has it gone bad? NULL: it cannot
 };

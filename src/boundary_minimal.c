@@ -1,4 +1,4 @@
-// Minimal conditions, eqs (60)-(69). The loop carries the stage's stress; a correcting force on top of it holds the
+// Minimal conditions, eqs (80)-(89). The loop carries the stage's stress; a correcting force on top of it holds the
 // imposed components of the mean gradient: exactly, as the multiplier of a constraint on the velocities that move the
 // grains (ours), or by a penalty on the error [P 3.2-3.5]. Higher rows hold the shape (order p, ours).
 #include "boundary_minimal.h"
@@ -122,7 +122,7 @@ static void restored(tal_sim *sim) {
   settle_on_loop(sim, sim->graph.x, sim->graph.y);
 }
 
-// Forces of the stress that the stage puts on the loop (60), [2B].
+// Forces of the stress that the stage puts on the loop (80), [2B].
 static void given_forces(const tal_sim *sim, geo_tensor stress, double *force) {
   const tal_rows *rows = &sim->rows;
   for (size_t k = 0; k < rows->nodes; k++) {
@@ -145,7 +145,7 @@ static void write_forces(tal_sim *sim, geo_tensor stress) {
   }
 }
 
-// (67): the stress K dE / (h A) for the error dE that the velocities seen by the laws leave.
+// (87): the stress K dE / (h A) for the error dE that the velocities seen by the laws leave.
 static void penalise(tal_sim *sim, const tal_boundary_target *t) {
   tal_rows *rows = &sim->rows;
   const int32_t *node = sim->graph.loop.node;
@@ -178,7 +178,7 @@ static void apply(tal_sim *sim) {
 
 // ---- the correcting forces ----
 
-// (71): what is imposed is there from the first instant on, by the impulse on the loop that costs least kinetic energy;
+// (91): what is imposed is there from the first instant on, by the impulse on the loop that costs least kinetic energy;
 // its work is what it costs. A penalty starts from the error.
 static void start(tal_sim *sim) {
   tal_grains *g = &sim->grains;
@@ -230,7 +230,7 @@ static void kicked(tal_sim *sim, double kick, const double *boundary, double *ve
   }
 }
 
-// Power of the correcting forces at the instant that lies `close` seconds of kick ahead of the velocities (70).
+// Power of the correcting forces at the instant that lies `close` seconds of kick ahead of the velocities (90).
 static double correcting_power(tal_sim *sim, double close) {
   tal_rows *rows = &sim->rows;
   double sum = 0;
@@ -238,6 +238,30 @@ static double correcting_power(tal_sim *sim, double close) {
   for (size_t k = 0; k < 2 * rows->nodes; k++)
     sum += (rows->force[k] - rows->given[k]) * rows->velocity[k];
   return sum;
+}
+
+static void couple(tal_sim *sim, double kick, bool first) {
+  tal_rows *rows = &sim->rows;
+  tal_implicit_body *body = sim->implicit.body;
+  const int32_t *node = sim->graph.loop.node;
+  if (!exact(sim))
+    return;
+  for (size_t k = 0; k < rows->nodes; k++) {
+    rows->velocity[2 * k] = body[node[k]].now[0];
+    rows->velocity[2 * k + 1] = body[node[k]].now[1];
+    rows->mobility[k] = kick * sim->grains.inverse_mass[node[k]];
+  }
+  if (first) {
+    tal_boundary_target t = target_of(sim);
+    sim->run.unsolvable = !tal_rows_set_up(rows, t.held, t.gradient, rows->mobility, &rows->equations);
+  }
+  if (sim->run.unsolvable)
+    return;
+  tal_rows_correct(rows, &rows->equations, rows->mobility, rows->velocity);
+  for (size_t k = 0; k < rows->nodes; k++) {
+    body[node[k]].now[0] = rows->velocity[2 * k];
+    body[node[k]].now[1] = rows->velocity[2 * k + 1];
+  }
 }
 
 static void constrain(tal_sim *sim, double close, double open) {
@@ -293,5 +317,6 @@ const tal_boundary tal_boundary_minimal = {
     .apply = apply,
     .start = start,
     .constrain = constrain,
+    .couple = couple,
     .restored = restored,
     .check = check};

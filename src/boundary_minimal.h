@@ -20,12 +20,12 @@ void tal_minimal_before_step(tal_sim *sim);
 // The mean gradient of the coming step less the imposed one, NAN where nothing is imposed: xx, yy, xy [1/s].
 geo_tensor tal_minimal_error(const tal_sim *sim);
 // Decay rate [1/s] of an error of the strain rate per unit of the penalty constant K [N m s], for the loop as it is:
-// the largest eigenvalue of (68).
+// the largest eigenvalue of (88).
 double tal_minimal_decay(const tal_rows *rows, const bool held[TAL_COMPONENTS], const double *inverse_mass,
                          const geo_loop *loop);
 // The same for a stage of the scene that has not begun, on a fresh graph of the grains as they are; NAN without one.
 double tal_minimal_decay_planned(tal_sim *sim, const tal_scene_stage *plan);
-// Largest K [N m s] that the step `dt` [s] bears beside contacts whose critical step is `critical` [s], (69).
+// Largest K [N m s] that the step `dt` [s] bears beside contacts whose critical step is `critical` [s], (89).
 double tal_minimal_penalty_limit(double decay, double dt, double critical);
 
 #endif

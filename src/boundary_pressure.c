@@ -1,33 +1,23 @@
 // Pressure on the Delaunay boundary, eq (22) [P 2.5, 3.2]: each edge of the loop carries p h times its length along the
 // inward normal, half to each end. On a closed loop that is a force and moment free system of uniform stress p.
-// With plates only the two arcs between the outermost plate-touching grains are pressed; the plates load the rest.
+// With plates only the two arcs between the outermost grains at the plates are pressed; the plates load the rest.
 // While the plates bed a packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
 #include "boundary.h"
 
 #include <stdlib.h>
 #include <string.h>
 
-// Marks the grains that touch a plate now, or, where none does, nothing.
-static void touching(const tal_sim *sim, int side, unsigned char *mark) {
-  const tal_contacts *s = &sim->wall_contacts;
-  memset(mark, 0, sim->grains.count);
-  for (size_t c = 0; c < s->count; c++)
-    if (s->overlap[c] > 0 && sim->walls.wall[s->j[c]].plate == side)
-      mark[s->i[c]] = 1;
-}
-
-// Loop places of the leftmost and rightmost grain touching the plate; the grain nearest the plate when none touches.
-static void plate_ends(const tal_sim *sim, int side, unsigned char *mark, int64_t *left, int64_t *right) {
+// Loop places of the leftmost and rightmost grain at the plate; the grain nearest the plate when there is none.
+static void plate_ends(const tal_sim *sim, int plate, int64_t *left, int64_t *right) {
   const geo_loop *loop = &sim->graph.loop;
   const tal_grains *g = &sim->grains;
-  touching(sim, side, mark);
   int64_t nearest = 0;
   *left = *right = -1;
   for (int64_t k = 0; k < (int64_t)loop->count; k++) {
     int32_t i = loop->node[k], n = loop->node[nearest];
-    if (side * g->y[i] - g->r[i] < side * g->y[n] - g->r[n])
+    if (plate * g->y[i] - g->r[i] < plate * g->y[n] - g->r[n])
       nearest = k;
-    if (!mark[i])
+    if (sim->graph.side[i] != (plate > 0 ? 1 : 2))
       continue;
     if (*left < 0 || g->x[i] < g->x[loop->node[*left]])
       *left = k;
@@ -53,7 +43,6 @@ static void corners(const tal_sim *sim, int side, int64_t *left, int64_t *right)
 }
 
 static void refreshed(tal_sim *sim) {
-  tal_grains *g = &sim->grains;
   sim->boundary_moved = true;
   if (!tal_walls_plate(&sim->walls, +1) || !tal_walls_plate(&sim->walls, -1)) {
     sim->run.arc_bottom_left = sim->run.arc_bottom_right = sim->run.arc_top_right = sim->run.arc_top_left = 0;
@@ -64,10 +53,8 @@ static void refreshed(tal_sim *sim) {
     corners(sim, -1, &sim->run.arc_top_left, &sim->run.arc_top_right);
     return;
   }
-  unsigned char *mark = tal_alloc(g->count, 1);
-  plate_ends(sim, +1, mark, &sim->run.arc_bottom_left, &sim->run.arc_bottom_right);
-  plate_ends(sim, -1, mark, &sim->run.arc_top_left, &sim->run.arc_top_right);
-  free(mark);
+  plate_ends(sim, +1, &sim->run.arc_bottom_left, &sim->run.arc_bottom_right);
+  plate_ends(sim, -1, &sim->run.arc_top_left, &sim->run.arc_top_right);
 }
 
 // The given number of edges counter-clockwise from place `from`.

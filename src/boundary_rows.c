@@ -9,7 +9,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-// E of (63): the uniform stress of each component.
+// E of (83): the uniform stress of each component.
 static const geo_tensor unit[TAL_COMPONENTS] = {{1, 0, 0, 0}, {0, 0, 0, 1}, {0, 1, 1, 0}, {0, -1, 1, 0}};
 
 double tal_component_of(tal_component k, geo_tensor gradient) {
@@ -67,7 +67,7 @@ static void component_rows(tal_rows *rows) {
   }
 }
 
-// Takes the mean stress and the torque out of forces on the loop: row - M N / A, M the moment tensor (64).
+// Takes the mean stress and the torque out of forces on the loop: row - M N / A, M the moment tensor (84).
 static void take_mean_out(const tal_rows *rows, const geo_loop *loop, const double *x, const double *y, double *row) {
   geo_tensor moment = {0};
   const double x0 = x[loop->node[0]], y0 = y[loop->node[0]];
@@ -139,7 +139,7 @@ static void legendre(double s, int most, double *p, double *dp, double *ddp) {
 }
 
 // Adds what the stress of every field does on a piece of edge k: at the point `at` from the box's centre, with the
-// outward normal times length n, the share s of it at the edge's end (65).
+// outward normal times length n, the share s of it at the edge's end (85).
 static void add_point(const tal_rows *rows, double *field, const box *b, geo_vec at, geo_vec n, size_t k, double s,
                       int order) {
   double px[TAL_ORDER_MOST + 3], dx[TAL_ORDER_MOST + 3], ddx[TAL_ORDER_MOST + 3];
@@ -228,7 +228,7 @@ static void take_components_out(const tal_rows *rows, const bool held[TAL_COMPON
   gsl_matrix_free(base);
 }
 
-// Mixes the fields by the singular value decomposition of their weighted forces; keeps what is above the cutoff (66).
+// Mixes the fields by the singular value decomposition of their weighted forces; keeps what is above the cutoff (86).
 // `whole`: length of the longest field before its mean was taken out.
 static void keep_independent(tal_rows *rows, const double *field, double whole, const bool held[TAL_COMPONENTS],
                              const double *root) {
@@ -301,14 +301,6 @@ void tal_rows_refresh(tal_rows *rows, const geo_loop *loop, const double *x, con
 
 // ---- solving ----
 
-// The rows in force, their lengths and the matrix of (62), scaled to a unit diagonal.
-typedef struct equations {
-  size_t count;
-  size_t row[TAL_ROWS_MOST];
-  double scale[TAL_ROWS_MOST], aim[TAL_ROWS_MOST];
-  double matrix[TAL_ROWS_MOST * TAL_ROWS_MOST], tau[TAL_ROWS_MOST];
-} equations;
-
 static double mobile_product(const tal_rows *rows, size_t a, size_t b, const double *mobility) {
   const double *p = rows->row + a * 2 * rows->nodes, *q = rows->row + b * 2 * rows->nodes;
   double sum = 0;
@@ -317,8 +309,8 @@ static double mobile_product(const tal_rows *rows, size_t a, size_t b, const dou
   return sum;
 }
 
-static bool set_up(equations *s, const tal_rows *rows, const bool held[TAL_COMPONENTS], geo_tensor target,
-                   const double *mobility) {
+bool tal_rows_set_up(const tal_rows *rows, const bool held[TAL_COMPONENTS], geo_tensor target, const double *mobility,
+                     tal_row_equations *s) {
   double first = 0;
   s->count = 0;
   for (size_t r = 0; r < TAL_COMPONENTS + rows->rank; r++) {
@@ -337,15 +329,18 @@ static bool set_up(equations *s, const tal_rows *rows, const bool held[TAL_COMPO
     for (size_t b = 0; b <= a; b++)
       s->matrix[a * s->count + b] = s->matrix[b * s->count + a] =
           s->scale[a] * s->scale[b] * mobile_product(rows, s->row[a], s->row[b], mobility);
+  if (!s->count)
+    return true;
   gsl_matrix_view matrix = gsl_matrix_view_array(s->matrix, s->count, s->count);
   gsl_vector_view tau = gsl_vector_view_array(s->tau, s->count);
   gsl_linalg_QR_decomp(&matrix.matrix, &tau.vector);
   return true;
 }
 
-// Adds to the multipliers what is missing and corrects the velocities.
-static void correct(equations *s, tal_rows *rows, const double *mobility, double *velocity) {
+void tal_rows_correct(tal_rows *rows, tal_row_equations *s, const double *mobility, double *velocity) {
   double missing[TAL_ROWS_MOST];
+  if (!s->count)
+    return;
   const size_t length = 2 * rows->nodes;
   for (size_t a = 0; a < s->count; a++)
     missing[a] = s->scale[a] * (s->aim[a] - product(rows->row + s->row[a] * length, velocity, length));
@@ -362,11 +357,11 @@ static void correct(equations *s, tal_rows *rows, const double *mobility, double
 
 bool tal_rows_solve(tal_rows *rows, const bool held[TAL_COMPONENTS], geo_tensor target, const double *mobility,
                     double *velocity) {
-  equations s;
+  tal_row_equations s;
   memset(rows->multiplier, 0, sizeof rows->multiplier);
-  if (!set_up(&s, rows, held, target, mobility))
+  if (!tal_rows_set_up(rows, held, target, mobility, &s))
     return false;
-  for (int pass = 0; s.count && pass < 2; pass++) // the second takes away the round-off of the first
-    correct(&s, rows, mobility, velocity);
+  for (int pass = 0; pass < 2; pass++) // the second takes away the round-off of the first
+    tal_rows_correct(rows, &s, mobility, velocity);
   return true;
 }

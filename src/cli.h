@@ -14,9 +14,11 @@
 // Each gets the words after the command word (argv[0] is the first of them) and returns the exit code.
 int tal_cli_run(int argc, char **argv);
 int tal_cli_check(int argc, char **argv);
+int tal_cli_impact(int argc, char **argv);
 int tal_cli_plot(int argc, char **argv);
 int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);
+int tal_cli_study(int argc, char **argv);
 
 typedef struct tal_command {
   const char *name;
@@ -34,12 +36,13 @@ void tal_cli_usage(FILE *out);
 
 // Options a command may accept, or'ed together.
 typedef enum tal_cli_accept {
-  TAL_CLI_OUT = 1,     // -o, --out DIR
-  TAL_CLI_THREADS = 2, // -t, --threads N
-  TAL_CLI_SET = 4,     // --set KEY=VALUE, repeated
-  TAL_CLI_RESUME = 8,  // --resume
-  TAL_CLI_QUIET = 16,  // -q, --quiet
-  TAL_CLI_FIGURES = 32 // --no-figures
+  TAL_CLI_OUT = 1,      // -o, --out DIR
+  TAL_CLI_THREADS = 2,  // -t, --threads N
+  TAL_CLI_SET = 4,      // --set KEY=VALUE, repeated
+  TAL_CLI_RESUME = 8,   // --resume
+  TAL_CLI_QUIET = 16,   // -q, --quiet
+  TAL_CLI_FIGURES = 32, // --no-figures
+  TAL_CLI_STUDY = 64    // --plan, --merge
 } tal_cli_accept;
 
 typedef struct tal_cli_options {
@@ -49,7 +52,8 @@ typedef struct tal_cli_options {
   const char **sets;    // owned list of KEY=VALUE
   size_t set_count;
   bool resume, quiet;
-  bool figures; // true unless --no-figures
+  bool figures;     // true unless --no-figures
+  bool plan, merge; // study: only write the plan, only merge
 } tal_cli_options;
 
 // Parses the words after the command `name`, which accepts the options of `accepted` and needs exactly one argument,

@@ -3,6 +3,7 @@
 
 #include "boundary_minimal.h"
 #include "critical.h"
+#include "damping.h"
 #include "effects.h"
 #include "integrate.h"
 #include "sim.h"
@@ -24,7 +25,7 @@ static void print_effects(const tal_sim *sim) {
                {TAL_EFFECT_BOUNDARY, "boundary forces"},
                {TAL_EFFECT_WALLS, "walls or plates"},
                {TAL_EFFECT_HELD, "driven grains"},
-               {TAL_EFFECT_IMPLICIT, "friction solved implicitly"}};
+               {TAL_EFFECT_IMPLICIT, "friction and damping solved implicitly"}};
   printf("effects       ");
   if (!(sim->effects & TAL_EFFECT_HERTZ))
     printf("linear contact");
@@ -108,10 +109,69 @@ static double packed_height(const tal_grains *g) {
   return top - bottom;
 }
 
+// The damped law in figures: two mean grains that meet at `speed`; its name, "any speed" where it makes no difference.
+static void print_impact(const tal_sim *sim, const char *where, double speed) {
+  const tal_scene *scene = sim->scene;
+  tal_pair pair = tal_damping_mean_pair(scene, &sim->constants);
+  tal_impact impact = tal_damping_impact(scene, &pair, speed);
+  printf("impact        two mean grains at %s: e %.4g, contact %.4g s", where, impact.restitution, impact.duration);
+  if (isfinite(first_rate(scene)))
+    printf(" = %.3g t0", impact.duration * first_rate(scene));
+  if (pair.damping > 0)
+    printf(" (damping %.4g %s, %s %.4g)", pair.damping, sim->effects & TAL_EFFECT_HERTZ ? "s" : "N s/m",
+           sim->effects & TAL_EFFECT_HERTZ ? "T/tau" : "zeta", tal_damping_number_at(scene, &pair, speed));
+  printf("\n");
+}
+
+static void print_impacts(const tal_sim *sim) {
+  const tal_constants *k = &sim->constants;
+  char where[80];
+  if (!(sim->effects & TAL_EFFECT_HERTZ)) {
+    print_impact(sim, "any speed", 1);
+    return;
+  }
+  if (isfinite(k->vR)) {
+    snprintf(where, sizeof where, "vR = %.4g m/s", k->vR);
+    print_impact(sim, where, k->vR);
+  }
+  if (isfinite(sim->scene->contact.restitution_speed)) {
+    snprintf(where, sizeof where, "restitution_speed = %.4g m/s", k->restitution_speed);
+    print_impact(sim, where, k->restitution_speed);
+  }
+}
+
+static bool any_listed_mass(const tal_scene *scene) {
+  for (size_t i = 0; i < scene->grains.list_count; i++)
+    if (!isnan(scene->grains.list[i].mass))
+      return true;
+  return false;
+}
+
+// phi of each stage that has a rate, and how far mass scaling is from breaking it.
+static void print_quasistatic(const tal_sim *sim, double height) {
+  const tal_scene *scene = sim->scene;
+  double psi = 2 * sim->constants.mean_radius / height;
+  for (size_t s = 0; s < scene->stage_count; s++) {
+    const tal_scene_stage *stage = &scene->stages[s];
+    double pressure = stage->pressure > 0 ? stage->pressure : first_pressure(scene);
+    if (!(fabs(stage->rate) > 0) || isnan(pressure))
+      continue;
+    double phi = tal_quasistatic_coefficient(sim, fabs(stage->rate), pressure, height);
+    printf("phi, psi      %.4g (quasi-static well below 1), %.4g (size, 2R/L) in stage %zu", phi, psi, s);
+    if (!any_listed_mass(scene))
+      printf("; phi is %g at mass_scaling %.3g", TAL_QUASISTATIC_LIMIT,
+             scene->mass_scaling * TAL_QUASISTATIC_LIMIT / phi);
+    printf("\n");
+    if (phi > TAL_QUASISTATIC_LIMIT)
+      printf("warning       stage %zu is not quasi-static: phi above %g; lower mass_scaling or rate\n", s,
+             TAL_QUASISTATIC_LIMIT);
+  }
+}
+
 static void print_numbers(const tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   const tal_constants *k = &sim->constants;
-  double height = packed_height(&sim->grains), pressure = first_pressure(scene), rate = first_rate(scene);
+  double height = packed_height(&sim->grains), pressure = first_pressure(scene);
   printf("grains        %zu, mean radius %.5g m, thickness %.5g m, mean mass %.5g kg (scaled by %g)\n",
          sim->grains.count, k->mean_radius, k->thickness, k->mean_mass, scene->mass_scaling);
   printf("packing       height %.5g m, solid fraction %.4f, coordination %.3f, largest overlap %.2g m\n", height,
@@ -119,7 +179,8 @@ static void print_numbers(const tal_sim *sim) {
   if (isfinite(k->vR))
     printf("vR            %.5g m/s\n", k->vR);
   const double dt = (double)tal_integrate_longest(&scene->integrator) * scene->integrator.dt;
-  double now = tal_critical_step(sim), confined = tal_critical_step_scene(scene, k, k->mean_mass / 2);
+  double now = tal_critical_step(sim),
+         confined = tal_critical_step_scene(scene, k, k->mean_mass / 2, !(sim->effects & TAL_EFFECT_IMPLICIT));
   printf("dt/dt_crit    %.3g on the packed grains", dt / now);
   if (isfinite(confined))
     printf(", %.3g for two mean grains under the load of the scene", dt / confined);
@@ -128,9 +189,8 @@ static void print_numbers(const tal_sim *sim) {
   if (isfinite(friction) && !(sim->effects & TAL_EFFECT_IMPLICIT))
     printf("friction      explicit steps above %.3g s chatter by more than vR; dt is %.3g times that\n", friction,
            dt / friction);
-  if (isfinite(rate) && isfinite(pressure))
-    printf("phi, psi      %.4g (quasi-static well below 1), %.4g (size, 2R/L)\n",
-           tal_quasistatic_coefficient(sim, rate, pressure, height), 2 * k->mean_radius / height);
+  print_impacts(sim);
+  print_quasistatic(sim, height);
 }
 
 // What the explicit step lets a penalty be, for the loop of the packing; contacts take their share of it later.
@@ -141,7 +201,8 @@ static void print_penalties(tal_sim *sim) {
       continue;
     const double dt = (double)tal_integrate_longest(&stage->integrator) * stage->integrator.dt;
     double limit = tal_minimal_penalty_limit(tal_minimal_decay_planned(sim, stage), dt, (double)INFINITY);
-    printf("penalty       stage %zu: explicit limit K < %.4g N m s at dt = %g s, less what contacts take", s, limit, dt);
+    printf("penalty       stage %zu: explicit limit K < %.4g N m s at dt = %g s, less what contacts take", s, limit,
+           dt);
     if (isnan(stage->penalty))
       printf("; half of what is left is taken\n");
     else

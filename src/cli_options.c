@@ -11,7 +11,11 @@ static const tal_command commands[] = {
     {"run", "SCENE.yaml [-o DIR] [-t THREADS] [--set KEY=VALUE]... [--resume] [-q] [--no-figures]",
      "run a scene; series, fields, checkpoints and figures go to DIR", tal_cli_run},
     {"check", "SCENE.yaml [--set KEY=VALUE]...", "validate a scene and print what a run of it would do", tal_cli_check},
+    {"impact", "SCENE.yaml [-o DIR] [--set KEY=VALUE]... [--no-figures]",
+     "restitution and contact time of two mean grains over the damping: impact.csv, impact.png", tal_cli_impact},
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
+    {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
+     "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},
     {"verify", "DIR", "check the files of a run against their checksums and each other", tal_cli_verify},
     {"keys", "[KEY] [--json | --markdown | --bash]", "every scene key: type, unit, range, default, meaning",
      tal_cli_keys},
@@ -51,6 +55,8 @@ static const option_help table[] = {
     {TAL_CLI_RESUME, {"resume", no_argument, NULL, 'r'}, NULL, "go on from the folder's last checkpoint"},
     {TAL_CLI_QUIET, {"quiet", no_argument, NULL, 'q'}, NULL, "no progress on the terminal"},
     {TAL_CLI_FIGURES, {"no-figures", no_argument, NULL, 'n'}, NULL, "draw no figures at the end"},
+    {TAL_CLI_STUDY, {"plan", no_argument, NULL, 'p'}, NULL, "write the plan and run nothing"},
+    {TAL_CLI_STUDY, {"merge", no_argument, NULL, 'm'}, NULL, "run nothing, merge the runs that are there"},
     {0, {"help", no_argument, NULL, 'h'}, NULL, "this text"}};
 
 #define OPTIONS (sizeof table / sizeof *table)
@@ -110,6 +116,12 @@ static int take(tal_cli_options *options, const char *name, int letter, const ch
     return TAL_OK;
   case 'n':
     options->figures = false;
+    return TAL_OK;
+  case 'p':
+    options->plan = true;
+    return TAL_OK;
+  case 'm':
+    options->merge = true;
     return TAL_OK;
   default:
     return TAL_OK;

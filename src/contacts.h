@@ -14,6 +14,7 @@
   X(double, damping, "N s/m^1.5 | N s/m", WORK, "coefficient of the viscous part of the normal law")                   \
   X(double, friction, "1", WORK, "coefficient of friction")                                                            \
   X(double, spring, "N", STATE, "spring law: tangential spring force after the last step; implicit friction: ft")      \
+  X(double, viscous, "N", STATE, "implicit friction: viscous part of the normal force after the last step")            \
   X(double, spring_stiffness, "N/m", STATE, "tangential stiffness after the last step (spring law only)")              \
   X(double, nx, "1", WORK, "unit normal into i")                                                                       \
   X(double, ny, "1", WORK, "unit normal into i")                                                                       \

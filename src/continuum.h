@@ -22,9 +22,10 @@ typedef struct tal_graph {
   geo_mesh mesh;         // T triangles of grain indices
   geo_loop loop;         // counter-clockwise boundary grains
   unsigned char *inside; // owned; [T] 1 for cells inside the loop
-  double *x, *y;         // owned; [n] centres at the last refresh [m]
-  size_t grain_count;    // n
-  bool valid;            // false before the first refresh and after a failed one
+  unsigned char *side; // owned; [n] the rigid side a grain rests on (1, 2, ...) or 0, for the next refresh; may be NULL
+  double *x, *y;       // owned; [n] centres at the last refresh [m]
+  size_t grain_count;  // n
+  bool valid;          // false before the first refresh and after a failed one
   // Derived from mesh, loop and inside by refresh and restore.
   size_t cell_count;       // C
   int32_t *cell;           // owned; [C] triangle of each cell

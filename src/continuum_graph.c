@@ -31,6 +31,7 @@ void tal_graph_clear(tal_graph *graph) {
   geo_mesh_clear(&graph->mesh);
   geo_loop_clear(&graph->loop);
   free(graph->inside);
+  free(graph->side);
   free(graph->x);
   free(graph->y);
   clear_index(graph);
@@ -115,7 +116,8 @@ tal_status tal_graph_refresh(tal_graph *graph, const tal_grains *grains, tal_err
     return tal_fail(err, TAL_INVALID, "no Delaunay graph of the %zu grains: %s", grains->count, report.text);
   free(graph->inside);
   graph->inside = tal_alloc(graph->mesh.triangle_count, sizeof *graph->inside);
-  if (geo_loop_peel(&graph->loop, &graph->mesh, grains->x, grains->y, grains->r, graph->gap_limit, graph->inside) != 0)
+  if (geo_loop_peel(&graph->loop, &graph->mesh, grains->x, grains->y, grains->r, graph->side, graph->gap_limit,
+                    graph->inside) != 0)
     return tal_fail(err, TAL_INVALID,
                     "no assembly is left of the %zu grains: gaps wider than %g m let every cell be peeled off",
                     grains->count, graph->gap_limit);

@@ -1,5 +1,6 @@
 #include "critical.h"
 
+#include "damping.h"
 #include "effects.h"
 #include "law.h"
 
@@ -24,6 +25,8 @@ static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, dou
   double root = sqrt(s->overlap[c]);
   *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
   *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
+  if (sim->effects & TAL_EFFECT_IMPLICIT)
+    *damping = 0; // solved, and stable for any step
 }
 
 // How much stiffer than the normal spring the tangential one is to grain i, turning included; at least 1.
@@ -107,17 +110,14 @@ double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
 static double confined_slope(const tal_scene *scene, const tal_constants *k, double pressure, double *damping) {
   double stiffness = tal_hertz_stiffness(k->modulus, k->modulus, k->mean_radius / 2);
   double overlap = pow(pressure * 2 * k->mean_radius * k->thickness / stiffness, 2.0 / 3);
-  *damping = scene->material.damping * stiffness * sqrt(overlap);
+  *damping = tal_damping_coefficient(scene, k, stiffness, k->mean_mass / 2) * sqrt(overlap);
   return tal_hertz_slope(stiffness, sqrt(overlap));
 }
 
-double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, double reduced_mass) {
+double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, double reduced_mass, bool damped) {
   if (strcmp(scene->contact.normal, "linear") == 0) {
-    double stiffness = scene->contact.stiffness, damping = 0;
-    if (!isnan(scene->contact.damping))
-      damping = scene->contact.damping;
-    if (!isnan(scene->contact.restitution))
-      damping = 2 * tal_linear_damping_ratio(scene->contact.restitution) * sqrt(stiffness * reduced_mass);
+    double stiffness = scene->contact.stiffness;
+    double damping = damped ? tal_damping_coefficient(scene, k, stiffness, reduced_mass) : 0;
     return tal_critical_step_pair(stiffness, damping, reduced_mass);
   }
   double least = (double)INFINITY;
@@ -125,7 +125,7 @@ double tal_critical_step_scene(const tal_scene *scene, const tal_constants *k, d
     if (!(scene->stages[s].pressure > 0))
       continue;
     double damping, slope = confined_slope(scene, k, scene->stages[s].pressure, &damping);
-    least = fmin(least, tal_critical_step_pair(slope, damping, k->mean_mass / 2));
+    least = fmin(least, tal_critical_step_pair(slope, damped ? damping : 0, k->mean_mass / 2));
   }
   return least;
 }

@@ -13,7 +13,7 @@ enum tal_effect {
   TAL_EFFECT_BOUNDARY = 64,   // forces of a boundary on grains (pressure)
   TAL_EFFECT_WALLS = 128,     // walls and plates
   TAL_EFFECT_HELD = 256,      // fixed grains or held spins whose holders do work
-  TAL_EFFECT_IMPLICIT = 512   // friction is solved apart from the sweep over the contacts (friction.h)
+  TAL_EFFECT_IMPLICIT = 512   // friction and damping are solved together (implicit.h)
 };
 
 #define TAL_EFFECT_FRICTION (TAL_EFFECT_REGULARISED | TAL_EFFECT_SPRING)

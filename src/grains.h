@@ -32,8 +32,8 @@
   X(double, rx, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
   X(double, ry, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
   X(double, rtorque, "N m", WORK, "observed resultant torque")                                                         \
-  X(double, x_list, "m", WORK, "centre when the neighbour list was built")                                             \
-  X(double, y_list, "m", WORK, "centre when the neighbour list was built")
+  X(double, x_list, "m", STATE, "centre when the neighbour list was built")                                            \
+  X(double, y_list, "m", STATE, "centre when the neighbour list was built")
 
 typedef struct tal_grains {
   size_t count;

@@ -8,7 +8,7 @@
 struct tal_integrator {
   const char *name;
   const char *help;
-  bool implicit; // friction is solved by friction.h, not by the sweep over the contacts
+  bool implicit; // friction and damping are solved by implicit.h, not by the sweep over the contacts
   int64_t (*cycle)(const tal_scene_integrator *plan); // small steps after which the pattern repeats; NULL: 1
   // Length in small steps of the step that starts `done` small steps after the start of the stage; NULL: 1.
   int64_t (*length)(const tal_scene_integrator *plan, int64_t done);

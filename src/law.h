@@ -57,6 +57,14 @@ TAL_KERNEL tal_law_force tal_contact_law(tal_meeting m, tal_law_constants k, uns
   return f;
 }
 
+// Normal force per speed of approach [N s/m].
+TAL_KERNEL double tal_viscosity(tal_meeting m, unsigned effects) {
+  double touching = m.overlap > 0 ? m.overlap : 0;
+  double viscosity =
+      effects & TAL_EFFECT_HERTZ ? tal_hertz_viscous(m.damping, sqrt(touching), 1) : tal_linear_viscous(m.damping, 1);
+  return m.overlap > 0 ? viscosity : 0;
+}
+
 // Registered laws: name, one-line help, the effects they set.
 struct tal_law {
   const char *name;

@@ -1,33 +1,94 @@
-// Friction of one contact solved at the velocity it leaves behind, eqs (50)-(52) of docs/method.md: the force of a step
-// is the law's force at the slip that this very force brings about. Both laws are monotone, so there is one root.
+// Friction and normal damping of one contact solved at the velocity they leave behind, eqs (50)-(53) of docs/method.md:
+// the force of a step is the law's force at the speed that this very force brings about. All laws are monotone, so
+// there is one root.
 #ifndef TAL_LAW_IMPLICIT_H
 #define TAL_LAW_IMPLICIT_H
 
 #include "root.h"
 #include <math.h>
 
-// One round of Halley's iteration for u^c + b u = a.
-TAL_KERNEL double tal_implicit_round(double u, double a, double b, double c) {
-  double power = tal_power(u, c - 1);
-  double excess = u * power + b * u - a, slope = c * power + b, bend = c * (c - 1) * power / u;
-  return u - 2 * excess * slope / (2 * slope * slope - excess * bend);
+// Normal force [N] of a contact with elastic force fe and viscosity c [N s/m] whose mean speed of approach over the
+// kick would be `free` without it; yield [m/(s N)]: what a unit of normal force takes off that mean.
+TAL_KERNEL double tal_implicit_normal(double elastic, double viscosity, double free, double yield) {
+  double fn = (elastic + viscosity * free) / (1 + viscosity * yield);
+  return fn > 0 ? fn : 0;
+}
+
+// 2^x to 1e-3, |x| < 1000.
+TAL_KERNEL double tal_rough_exp2(double x) {
+  const double round = 6755399441055744.0; // 1.5 2^52
+  double n = (x + round) - round, r = x - n;
+  return tal_double(((tal_bits(n + 4503599627370496.0 + 1023.0) & 0x7ffULL)) << 52) *
+         (1 + r * (0.6931 + r * (0.2402 + r * 0.0555)));
+}
+
+// log2 x to 0.05, x normal and positive.
+TAL_KERNEL double tal_rough_log2(double x) {
+  uint64_t u = tal_bits(x);
+  double exponent = tal_double((u >> 52) | 0x4330000000000000ULL) - (4503599627370496.0 + 1023.0);
+  return exponent + tal_double((u & 0xfffffffffffffULL) | 0x3ff0000000000000ULL) - 0.957;
 }
 
 // Regularised law: the root u of u^c + b u = a; u is |ft| / (mu fn), a >= 0 the slip over vR that friction has to
 // brake, b >= 0 the slip over vR that mu fn takes away in the kick, c >= 1. The left side is convex and grows, and the
-// smaller of the bounds a/b (it sticks: friction takes all) and a^(1/c) (it slides: friction takes next to nothing) is
-// at most a factor 2 of it away: from there Halley's iteration has reached round-off after four rounds for c up to 50,
-// 1e-12 of u for c = 200 (tests/test_implicit_friction.c). No branches, so that it vectorises and gives the same bits
-// everywhere.
-TAL_KERNEL double tal_implicit_share(double a, double b, double c, double inverse_c) {
-  double slip = a > 1e-280 ? a : 1e-280, stuck = slip / (b > 1e-280 ? b : 1e-280);
-  double slides = tal_power(slip, inverse_c);
-  double u = stuck < slides ? stuck : slides;
-  u = tal_implicit_round(u, a, b, c); // written out: a loop in the body keeps the loop around it from vectorising
-  u = tal_implicit_round(u, a, b, c);
-  u = tal_implicit_round(u, a, b, c);
-  u = tal_implicit_round(u, a, b, c);
-  return a > 1e-280 ? u : 0;
+// smaller of a/b (it sticks: friction takes all) and a^(1/c) (it slides: friction takes next to nothing) is near it.
+TAL_KERNEL double tal_implicit_guess(double a, double b, double inverse_c) {
+  double stuck = a / (b > 1e-280 ? b : 1e-280), slides = tal_rough_exp2(tal_rough_log2(a) * inverse_c);
+  return stuck < slides ? stuck : slides;
+}
+
+// One round of Halley's iteration from u with power = u^(c-2).
+TAL_KERNEL double tal_implicit_round(double u, double power, double a, double b, double c) {
+  double first = power * u, excess = u * (first + b) - a, slope = c * first + b, bend = c * (c - 1) * power;
+  return u - 2 * excess * slope / (2 * slope * slope - excess * bend);
+}
+
+// At most this many contacts at a time.
+enum { TAL_IMPLICIT_BLOCK = 64 };
+
+// out[k] = u[k]^e for a whole e >= 0, by squaring.
+TAL_KERNEL void tal_whole_powers(const double *restrict u, double *restrict out, int count, int e) {
+  double square[TAL_IMPLICIT_BLOCK];
+  for (int k = 0; k < count; k++) {
+    square[k] = u[k];
+    out[k] = e & 1 ? u[k] : 1;
+  }
+  for (int left = e >> 1; left; left >>= 1) {
+    for (int k = 0; k < count; k++)
+      square[k] *= square[k];
+    if (left & 1)
+      for (int k = 0; k < count; k++)
+        out[k] *= square[k];
+  }
+}
+
+// Rounds from the guess to round-off for c up to 50, 1e-11 of u for c = 200 (tests/test_implicit_friction.c).
+enum { TAL_IMPLICIT_ROUNDS = 4 };
+
+// Roots of `count` contacts, a multiple of the vector's length; a and b as above. A whole c takes products where
+// another takes a logarithm and an exponential.
+TAL_KERNEL void tal_implicit_shares(const double *restrict a, const double *restrict b, double *restrict u, int count,
+                                    double c) {
+  double power[TAL_IMPLICIT_BLOCK];
+  const double inverse_c = 1 / c;
+  const int whole = c >= 2 && c == floor(c) && c < 1000 ? (int)c - 2 : -1;
+#pragma omp simd
+  for (int k = 0; k < count; k++)
+    u[k] = tal_implicit_guess(a[k] > 1e-280 ? a[k] : 1e-280, b[k], inverse_c);
+  for (int round = 0; round < TAL_IMPLICIT_ROUNDS; round++) {
+    if (whole >= 0)
+      tal_whole_powers(u, power, count, whole);
+    else
+#pragma omp simd
+      for (int k = 0; k < count; k++)
+        power[k] = tal_power(u[k], c - 2);
+#pragma omp simd
+    for (int k = 0; k < count; k++)
+      u[k] = tal_implicit_round(u[k], power[k], a[k], b[k], c);
+  }
+#pragma omp simd
+  for (int k = 0; k < count; k++)
+    u[k] = a[k] > 1e-280 ? u[k] : 0;
 }
 
 // Spring law: the force at this instant is the mean (1, 2, 1)/4 of the spring's at the last, this and the next instant,

@@ -2,6 +2,7 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
+#include "damping.h"
 #include "law.h"
 #include "sim.h"
 
@@ -27,12 +28,7 @@ static double reduced_mass(double inverse_i, double inverse_j) {
 }
 
 static double slot_damping(const tal_sim *sim, double stiffness, double mass) {
-  const tal_scene_contact *law = &sim->scene->contact;
-  if (sim->effects & TAL_EFFECT_HERTZ)
-    return sim->scene->material.damping * stiffness;
-  if (isnan(law->restitution))
-    return isnan(law->damping) ? 0 : law->damping;
-  return 2 * tal_linear_damping_ratio(law->restitution) * sqrt(stiffness * mass);
+  return tal_damping_coefficient(sim->scene, &sim->constants, stiffness, mass);
 }
 
 static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t j) {
@@ -45,7 +41,7 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
       sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
   slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
   slots->friction[c] = sim->friction;
-  slots->spring[c] = slots->spring_stiffness[c] = 0;
+  slots->spring[c] = slots->spring_stiffness[c] = slots->viscous[c] = 0;
 }
 
 static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t w) {
@@ -58,7 +54,7 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
                             : sim->scene->contact.stiffness;
   slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], 0));
   slots->friction[c] = wall->friction;
-  slots->spring[c] = slots->spring_stiffness[c] = 0;
+  slots->spring[c] = slots->spring_stiffness[c] = slots->viscous[c] = 0;
 }
 
 // Both lists ascend by (i, j): one merge carries the histories over.
@@ -70,6 +66,7 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
     if (o < old->count && old->i[o] == slots->i[c] && old->j[o] == slots->j[c]) {
       slots->spring[c] = old->spring[o];
       slots->spring_stiffness[c] = old->spring_stiffness[o];
+      slots->viscous[c] = old->viscous[o];
     }
   }
 }
@@ -77,7 +74,7 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
 static void list_pairs(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   geo_pairs *pairs = &sim->neighbours.pairs;
-  geo_cells_pairs(g->x, g->y, g->r, g->count, sim->constants.skin, pairs);
+  geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
   tal_contacts_reserve(&fresh, pairs->count + pairs->count / 16 + 64);
@@ -126,7 +123,9 @@ static void list_walls(tal_sim *sim) {
       const tal_wall *wall = &sim->walls.wall[w];
       if (!tal_wall_active(wall, sim->run.time))
         continue;
-      if (tal_wall_nearest(wall, g->x[i], g->y[i]).distance >= g->r[i] + sim->constants.skin)
+      // the wall where it was when the centres were there
+      double x = g->x_list[i] + (wall->x0 - wall->x_list), y = g->y_list[i] + (wall->y0 - wall->y_list);
+      if (tal_wall_nearest(wall, x, y).distance >= g->r[i] + sim->constants.skin)
         continue;
       if (fresh.count == fresh.capacity)
         tal_contacts_reserve(&fresh, fresh.capacity * 2 + 64);
@@ -169,9 +168,10 @@ static void list_incidences(tal_sim *sim) {
   n->first[0] = 0;
 }
 
-void tal_neighbours_rebuild(tal_sim *sim) {
+// The list for the centres in x_list, y_list.
+static void list_all(tal_sim *sim) {
   tal_neighbours *n = &sim->neighbours;
-  tal_grains *g = &sim->grains;
+  const tal_grains *g = &sim->grains;
   if (n->grain_capacity != g->count || !n->first) {
     free(n->first);
     free(n->wall_first);
@@ -184,15 +184,25 @@ void tal_neighbours_rebuild(tal_sim *sim) {
   list_pairs(sim);
   list_walls(sim);
   list_incidences(sim);
+  n->rebuilds++;
+}
+
+void tal_neighbours_rebuild(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
   memcpy(g->x_list, g->x, g->count * sizeof *g->x);
   memcpy(g->y_list, g->y, g->count * sizeof *g->y);
   for (size_t w = 0; w < sim->walls.count; w++) {
-    tal_wall *wall = &sim->walls.wall[w];
-    wall->x_list = wall->x0;
-    wall->y_list = wall->y0;
-    wall->listed = tal_wall_active(wall, sim->run.time);
+    sim->walls.wall[w].x_list = sim->walls.wall[w].x0;
+    sim->walls.wall[w].y_list = sim->walls.wall[w].y0;
   }
-  n->rebuilds++;
+  list_all(sim);
+  for (size_t w = 0; w < sim->walls.count; w++)
+    sim->walls.wall[w].listed = tal_wall_active(&sim->walls.wall[w], sim->run.time);
+}
+
+void tal_neighbours_restore(tal_sim *sim) {
+  sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
+  list_all(sim);
 }
 
 // Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.

@@ -20,6 +20,9 @@ void tal_neighbours_init(tal_neighbours *neighbours);
 void tal_neighbours_clear(tal_neighbours *neighbours);
 // Rebuilds the list of `sim` from the present centres; spring histories are carried over by (i, j).
 void tal_neighbours_rebuild(struct tal_sim *sim);
+// Makes the list of a restored run again: that of the centres it was last built from, so that the order of the contacts
+// and the moment of the next rebuild are those of the unbroken run.
+void tal_neighbours_restore(struct tal_sim *sim);
 // True when two bodies not on the list may have met since it was built, a wall has come or gone, or a coordinate is no
 // number.
 bool tal_neighbours_stale(const struct tal_sim *sim);

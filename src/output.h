@@ -12,6 +12,7 @@ typedef struct tal_stage_report {
   int64_t steps;
   double wall_time; // [s]
   double grain_steps_per_second;
+  double cpu_time; // [s] over all threads
 } tal_stage_report;
 
 typedef struct tal_run_report {
@@ -19,6 +20,7 @@ typedef struct tal_run_report {
   const char *reason; // sentence when invalid, else ""
   int cores;
   double wall_time; // [s] summed over resumed parts
+  double cpu_time;  // [s] the same over all threads
   double grain_steps_per_second;
   double energy_residual;
   const tal_stage_report *stages; // [stage_count]

@@ -94,6 +94,7 @@ static void put_run(tal_json *json, const tal_sim *sim, const tal_run_report *re
   tal_json_number(json, "time", sim->run.time);
   tal_json_integer(json, "force_evaluations", sim->run.force_evaluations);
   tal_json_number(json, "wall_time", report->wall_time);
+  tal_json_number(json, "cpu_time", report->cpu_time);
   tal_json_number(json, "grain_steps_per_second", report->grain_steps_per_second);
   tal_json_number(json, "energy_residual", report->energy_residual);
 }
@@ -113,6 +114,7 @@ static void put_stages(tal_json *json, const tal_run_report *report) {
     tal_json_text(json, "kind", stage->kind);
     tal_json_integer(json, "steps", stage->steps);
     tal_json_number(json, "wall_time", stage->wall_time);
+    tal_json_number(json, "cpu_time", stage->cpu_time);
     tal_json_number(json, "grain_steps_per_second", stage->grain_steps_per_second);
     tal_json_close(json, '}');
   }
@@ -179,6 +181,7 @@ static void read_stages(yaml_document_t *document, tal_stage_report *before, siz
     const yaml_node_t *stage = yaml_document_get_node(document, stages->data.sequence.items.start[k]);
     before[k].steps = (int64_t)number(member(document, stage, "steps"));
     before[k].wall_time = number(member(document, stage, "wall_time"));
+    before[k].cpu_time = number(member(document, stage, "cpu_time"));
     before[k].grain_steps_per_second = number(member(document, stage, "grain_steps_per_second"));
   }
 }

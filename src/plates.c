@@ -1,8 +1,11 @@
 #include "plates.h"
 
+#include "effects.h"
 #include "energy.h"
+#include "law.h"
 
 #include <math.h>
+#include <stdlib.h>
 
 void tal_plates_ensure(tal_sim *sim) {
   if (tal_walls_plate(&sim->walls, +1))
@@ -19,6 +22,19 @@ void tal_plates_ensure(tal_sim *sim) {
     plate->y0 = plate->y1 = side > 0 ? bottom : top;
     plate->modulus = sim->constants.modulus;
   }
+}
+
+void tal_plates_mark(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  const tal_wall *bottom = tal_walls_plate(&sim->walls, +1), *top = tal_walls_plate(&sim->walls, -1);
+  free(sim->graph.side);
+  sim->graph.side = NULL;
+  if (!bottom || !top)
+    return;
+  const double reach = 0.01 * 2 * sim->constants.mean_radius;
+  sim->graph.side = tal_alloc(g->count, 1);
+  for (size_t i = 0; i < g->count; i++)
+    sim->graph.side[i] = g->y[i] - g->r[i] < bottom->y0 + reach ? 1 : g->y[i] + g->r[i] > top->y0 - reach ? 2 : 0;
 }
 
 double tal_plates_distance(const tal_sim *sim) {
@@ -38,18 +54,34 @@ static double width_at_plate(const tal_sim *sim, int side) {
   return sim->grains.x[right] - sim->grains.x[left];
 }
 
-static void servo(tal_sim *sim, int side, double target, double speed_limit) {
+// Tangent stiffness [N/m] of one contact with a mean grain that carries the whole load. The plate counts on no less: at
+// a first light touch the tangent of Hertz' law promises far too long a way.
+static double stiffness_at(const tal_sim *sim, double load) {
+  if (!(sim->effects & TAL_EFFECT_HERTZ))
+    return sim->scene->contact.stiffness;
+  const tal_constants *k = &sim->constants;
+  double stiffness = tal_hertz_stiffness(k->modulus, k->modulus, k->mean_radius);
+  return tal_hertz_slope(stiffness, cbrt(load / stiffness));
+}
+
+// Half the speed at which the grains at the two plates part; their common motion is not the plates' to follow.
+static double parting_speed(const tal_sim *sim) {
+  return 0.5 * (tal_walls_plate(&sim->walls, -1)->contact_vy - tal_walls_plate(&sim->walls, +1)->contact_vy);
+}
+
+static void servo(tal_sim *sim, int side, double target, double parting, double speed_limit) {
   tal_wall *plate = tal_walls_plate(&sim->walls, side);
-  double load = -side * plate->fy; // grains push the bottom plate (side +1) down
-  double resistance = plate->contact_stiffness * sim->dt + plate->contact_damping;
-  double outward = resistance > 0 ? 0.8 * (load - target) / resistance : -speed_limit;
-  outward = fmax(-speed_limit, fmin(speed_limit, outward));
-  plate->vy = -side * outward;
+  double elastic = -side * (plate->fy - plate->damping_fy); // grains push the bottom plate (side +1) down
+  double stiffness = fmax(plate->contact_stiffness, stiffness_at(sim, target));
+  double resistance = stiffness * sim->dt + plate->contact_damping;
+  double outward = resistance > 0 ? parting + 0.8 * (elastic - target) / resistance : 0;
+  plate->vy = -side * fmax(-speed_limit, fmin(speed_limit, outward));
 }
 
 void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit) {
+  const double parting = parting_speed(sim), line = pressure * sim->constants.thickness;
   for (int side = 1; side >= -1; side -= 2)
-    servo(sim, side, pressure * sim->constants.thickness * width_at_plate(sim, side), speed_limit);
+    servo(sim, side, line * width_at_plate(sim, side), parting, speed_limit);
 }
 
 void tal_plates_remove(tal_sim *sim) {

@@ -16,8 +16,7 @@ static double now(void) {
   return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
-// Simulated time a stage takes [s], from the keys it has; *open: it may take longer.
-static double nominal_time(const tal_scene_stage *stage, bool *open) {
+double tal_progress_nominal_time(const tal_scene_stage *stage, bool *open) {
   if (isfinite(stage->duration) && stage->duration > 0)
     return stage->duration;
   if (isfinite(stage->rate) && stage->rate != 0 && isfinite(stage->strain))
@@ -32,7 +31,7 @@ static double steps_left(const tal_sim *sim, double *share, bool *open) {
   double steps = 0;
   for (size_t k = (size_t)sim->run.stage; k < scene->stage_count; k++) {
     const tal_scene_stage *stage = &scene->stages[k];
-    double time = nominal_time(stage, open), left = time;
+    double time = tal_progress_nominal_time(stage, open), left = time;
     if (k == (size_t)sim->run.stage) {
       left = fmax(0, time - (sim->run.time - sim->run.stage_start));
       *share = time > 0 ? 1 - left / time : 0;
@@ -43,7 +42,7 @@ static double steps_left(const tal_sim *sim, double *share, bool *open) {
   return steps;
 }
 
-static void put_time(char *text, size_t size, double seconds) {
+void tal_progress_put_time(char *text, size_t size, double seconds) {
   if (!(seconds < 360000)) {
     snprintf(text, size, "--:--");
   } else if (seconds < 3600) {
@@ -68,7 +67,7 @@ void tal_progress_line(const tal_sim *sim, int64_t steps, double seconds, char *
   if (isfinite(stage->rate) && stage->rate != 0) {
     snprintf(strain, sizeof strain, "strain %.4f  ", sim->run.axial_strain);
   }
-  put_time(rest, sizeof rest, speed > 0 ? left / speed : HUGE_VAL);
+  tal_progress_put_time(rest, sizeof rest, speed > 0 ? left / speed : HUGE_VAL);
   snprintf(text, size, "[%.*s%.*s] %lld/%zu %.12s  %s%.0f steps/s  %s%s left", filled, "####################",
            BAR - filled, "....................", (long long)sim->run.stage + 1, scene->stage_count, stage->kind, strain,
            speed, open ? ">" : "", rest);

@@ -32,10 +32,18 @@ static void catch_signals(void) {
   sigaction(SIGUSR1, &action, NULL);
 }
 
-static double clock_now(void) {
+static double clock_read(clockid_t clock) {
   struct timespec now;
-  clock_gettime(CLOCK_MONOTONIC, &now);
+  clock_gettime(clock, &now);
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+static double clock_now(void) {
+  return clock_read(CLOCK_MONOTONIC);
+}
+
+static double cpu_now(void) {
+  return clock_read(CLOCK_PROCESS_CPUTIME_ID);
 }
 
 // A run under way: what the observers share.
@@ -45,43 +53,51 @@ typedef struct job {
   tal_output *output;
   tal_progress progress;
   tal_row row;
-  tal_stage_report *stages; // owned; [stage_count]
-  double started, stage_started;
-  int64_t stage_first_step, first_step;
-  double wall_before; // [s] of the parts of the run before this one
+  tal_stage_report *stages;    // owned; [stage_count]
+  double started, cpu_started; // [s] clocks when this part of the run began
+  double stage_started, stage_cpu_started;
+  int64_t first_step;
+  double wall_before, cpu_before; // [s] of the parts of the run before this one
+  double phi;                     // largest of the rows of stages with a rate
   int cores;
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-// What the user should know about the accuracy of this run; count of sentences in `out` (capacity 1).
-static size_t warnings(const job *this, char text[200], const char *out[1]) {
+enum { WARNINGS = 2, WARNING_SIZE = 200 };
+
+// What the user should know about the accuracy of this run; count of sentences in `text`.
+static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
   double friction = tal_friction_step(this->sim, this->sim->run.pressure);
   double dt = tal_step_longest(this->sim);
-  if (!(dt > friction) || (this->sim->effects & TAL_EFFECT_IMPLICIT))
-    return 0;
-  snprintf(text, 200,
-           "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
-           dt, friction);
-  out[0] = text;
-  return 1;
+  size_t count = 0;
+  if (dt > friction && !(this->sim->effects & TAL_EFFECT_IMPLICIT))
+    snprintf(text[count++], WARNING_SIZE,
+             "dt = %g s: explicit regularised friction chatters above %.3g s, which softens the response and adds slip",
+             dt, friction);
+  if (this->phi > TAL_QUASISTATIC_LIMIT)
+    snprintf(text[count++], WARNING_SIZE,
+             "phi reached %.3g: above %g the deformation is not quasi-static; lower mass_scaling or rate", this->phi,
+             TAL_QUASISTATIC_LIMIT);
+  return count;
 }
 
 static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
-  char text[200];
-  const char *sentences[1];
+  char text[WARNINGS][WARNING_SIZE];
+  const char *const sentences[WARNINGS] = {text[0], text[1]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
                            .wall_time = this->wall_before + took,
+                           .cpu_time = this->cpu_before + cpu_now() - this->cpu_started,
                            .grain_steps_per_second =
                                took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0,
                            .energy_residual = this->row.energy_residual,
                            .stages = this->stages,
                            .stage_count = this->scene->stage_count,
                            .warnings = sentences,
-                           .warning_count = warnings(this, text, sentences)};
+                           .warning_count = warnings(this, text)};
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
@@ -91,6 +107,22 @@ static tal_status inspect(job *this, tal_error *err) {
   return tal_step_inspect(this->sim, err);
 }
 
+// Books the time since the last call on the stage.
+static void account_stage(job *this, int64_t stage) {
+  if (!this->scene->stage_count)
+    return;
+  tal_stage_report *report = &this->stages[stage];
+  const double now = clock_now(), cpu = cpu_now();
+  report->steps = this->sim->run.stage_step;
+  report->wall_time += now - this->stage_started;
+  report->cpu_time += cpu - this->stage_cpu_started;
+  report->grain_steps_per_second =
+      report->wall_time > 0 ? (double)report->steps * (double)this->sim->grains.count / report->wall_time : 0;
+  this->stage_started = now;
+  this->stage_cpu_started = cpu;
+}
+
+// Times are booked with every checkpoint: what a killed run has cost up to there is not lost.
 static tal_status write_checkpoint(job *this, tal_error *err) {
   tal_status status = inspect(this, err);
   if (status == TAL_OK)
@@ -98,6 +130,7 @@ static tal_status write_checkpoint(job *this, tal_error *err) {
   if (status)
     return status;
   this->checkpoint = true;
+  account_stage(this, this->sim->run.stage);
   return report_run(this, "running", "", err);
 }
 
@@ -116,9 +149,21 @@ static bool due(const tal_sim *sim, double every) {
   return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
 }
 
+// phi of the row just taken where the stage has a rate, else 0. Not below the stage's pressure: a packing that is
+// compressed as it was made bears no stress at first.
+static double phi_now(const job *this) {
+  const tal_scene_stage *plan = tal_sim_stage(this->sim);
+  if (!plan || !(fabs(plan->rate) > 0))
+    return 0;
+  double height = 2 * this->sim->constants.mean_radius / this->row.psi;
+  double pressure = fmax(0.5 * (this->row.sigma_xx + this->row.sigma_yy), plan->pressure);
+  return tal_quasistatic_coefficient(this->sim, fabs(plan->rate), pressure, height);
+}
+
 static tal_status write_row(job *this, bool fields, tal_error *err) {
   tal_status status;
   tal_sim_row(this->sim, &this->row);
+  this->phi = fmax(this->phi, phi_now(this));
   if ((status = tal_output_row(this->output, &this->row, err)))
     return status;
   if (fields && (status = tal_output_fields(this->output, this->sim, err)))
@@ -144,18 +189,6 @@ static tal_status observe(job *this, tal_error *err) {
   return status;
 }
 
-static void account_stage(job *this, int64_t stage) {
-  tal_stage_report *report = &this->stages[stage];
-  double now = clock_now(), took = now - this->stage_started;
-  int64_t steps = this->sim->run.step - this->stage_first_step;
-  report->kind = this->scene->stages[stage].kind;
-  report->steps = this->sim->run.stage_step;
-  report->wall_time += took;
-  report->grain_steps_per_second = took > 0 ? (double)steps * (double)this->sim->grains.count / took : 0;
-  this->stage_started = now;
-  this->stage_first_step = this->sim->run.step;
-}
-
 static tal_status advance(job *this, tal_error *err) {
   while (!tal_sim_done(this->sim)) {
     if (asked_to_stop)
@@ -163,8 +196,8 @@ static tal_status advance(job *this, tal_error *err) {
     int64_t stage = this->sim->run.stage;
     tal_status status = tal_sim_step(this->sim, err);
     if (this->sim->run.stage != stage) { // the step belongs to the next stage
-      this->stage_first_step = this->sim->run.step - this->sim->run.stage_step;
       this->stage_started = clock_now();
+      this->stage_cpu_started = cpu_now();
     }
     if (status || (status = observe(this, err)))
       return status;
@@ -178,7 +211,7 @@ static tal_status advance(job *this, tal_error *err) {
 // Steps until done, then says in run.json how it ended.
 static tal_status run_job(job *this, tal_error *err) {
   tal_status status = advance(this, err), reported;
-  if (status != TAL_OK && this->scene->stage_count)
+  if (status != TAL_OK)
     account_stage(this, this->sim->run.stage);
   switch (status) {
   case TAL_OK:
@@ -212,9 +245,11 @@ static void begin_accounts(job *this) {
     this->stages[s] = before[s];
     this->stages[s].kind = this->scene->stages[s].kind;
     this->wall_before += before[s].wall_time;
+    this->cpu_before += before[s].cpu_time;
   }
   this->started = this->stage_started = clock_now();
-  this->first_step = this->stage_first_step = this->sim->run.step;
+  this->cpu_started = this->stage_cpu_started = cpu_now();
+  this->first_step = this->sim->run.step;
 }
 
 static void fill_result(const job *this, tal_run_result *result) {

@@ -40,18 +40,19 @@ typedef struct tal_material {
   double poisson;  // [-]
   double density;  // [kg/m^3] before mass scaling
   double friction; // [-]
-  double damping;  // [s] T of the Hertz law [P 2.16]
+  double damping;  // [s] T of the Hertz law [P 2.16], NAN when contact.restitution is given
 } tal_material;
 
 typedef struct tal_scene_contact {
-  const char *normal;      // name of a registered normal law
-  const char *tangential;  // name of a registered tangential law
-  double exponent;         // c of the regularised law [P 2.18]
-  double vR;               // [m/s] NAN: 2 rate Rmean of the first stage with a rate
-  double stiffness;        // [N/m] linear
-  double restitution;      // linear: delivered speed ratio, NAN when damping is given
-  double damping;          // [N s/m] linear, NAN when restitution is given
-  double tangential_ratio; // spring: k_t / k_n, NAN: Mindlin's 2(1-nu)/(2-nu)
+  const char *normal;       // name of a registered normal law
+  const char *tangential;   // name of a registered tangential law
+  double exponent;          // c of the regularised law [P 2.18]
+  double vR;                // [m/s] NAN: 2 rate Rmean of the first stage with a rate
+  double stiffness;         // [N/m] linear
+  double restitution;       // delivered speed ratio, NAN when damping is given
+  double restitution_speed; // [m/s] hertz: where it is delivered, NAN: vR
+  double damping;           // [N s/m] linear, NAN when restitution is given
+  double tangential_ratio;  // spring: k_t / k_n, NAN: Mindlin's 2(1-nu)/(2-nu)
 } tal_scene_contact;
 
 typedef struct tal_scene_wall {

@@ -191,17 +191,6 @@ static void check_tracks(const checker *c) {
 
 // ---- contacts ----
 
-static void check_normal(const checker *c) {
-  const tal_scene *scene = c->scene;
-  bool hertz = named(scene->contact.normal, "hertz"), linear = named(scene->contact.normal, "linear");
-  if (hertz && !given(c, "material.young"))
-    missing(c, "material.young", "is missing (normal: hertz); accepted: a number in Pa > 0");
-  if (linear && given(c, "contact.restitution") && given(c, "contact.damping"))
-    wrong(c, "contact.damping", "stands beside contact.restitution; accepted: one of the two");
-  if (linear && given(c, "material.damping") && scene->material.damping != 0)
-    wrong(c, "material.damping", "has no effect with normal: linear; accepted: contact.damping or contact.restitution");
-}
-
 // A stage of unknown kind may have one.
 static bool has_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++) {
@@ -210,6 +199,39 @@ static bool has_rate(const tal_scene *scene) {
       return true;
   }
   return false;
+}
+
+// With normal: hertz. A damping of 0 beside it is as good as none, so that --set can change from one to the other.
+static void check_restitution(const checker *c) {
+  const tal_node *own = tal_node_find(c->root, "contact.restitution");
+  if (!own) {
+    if (given(c, "contact.restitution_speed"))
+      wrong(c, "contact.restitution_speed", "has no effect without contact.restitution; accepted: both or none");
+    return;
+  }
+  if (c->scene->material.damping > 0) {
+    const char *remedy = "accepted: one of the two (material.damping: 0 counts as none)";
+    const char *path = own->override ? "contact.restitution" : "material.damping";
+    const char *other = own->override ? "material.damping" : "contact.restitution";
+    tal_report_add(c->report, tal_node_find(c->root, path), path, "stands beside %s; %s", other, remedy);
+  }
+  if (c->scene->contact.restitution < 1 && !given(c, "contact.restitution_speed") && !given(c, "contact.vR") &&
+      !has_rate(c->scene))
+    missing(c, "contact.restitution_speed",
+            "is missing, and neither contact.vR nor a stage with a rate gives one; accepted: a number in m/s > 0");
+}
+
+static void check_normal(const checker *c) {
+  const tal_scene *scene = c->scene;
+  bool hertz = named(scene->contact.normal, "hertz"), linear = named(scene->contact.normal, "linear");
+  if (hertz && !given(c, "material.young"))
+    missing(c, "material.young", "is missing (normal: hertz); accepted: a number in Pa > 0");
+  if (linear && given(c, "contact.restitution") && given(c, "contact.damping"))
+    wrong(c, "contact.damping", "stands beside contact.restitution; accepted: one of the two");
+  if (hertz)
+    check_restitution(c);
+  if (linear && given(c, "material.damping") && scene->material.damping != 0)
+    wrong(c, "material.damping", "has no effect with normal: linear; accepted: contact.damping or contact.restitution");
 }
 
 static void check_slip_speed(const checker *c) {

@@ -113,6 +113,9 @@ static void put_type(FILE *out, const tal_key *key) {
     put_group(out, key->keys);
     fputc('}', out);
     break;
+  case TAL_KEY_TREE:
+    fputs("\"type\": [\"object\", \"array\", \"string\", \"number\", \"boolean\"]", out);
+    break;
   }
 }
 

@@ -132,8 +132,12 @@ static void read_group(tal_report *report, const tal_key *keys, const tal_node *
   }
 }
 
+void tal_schema_read(const tal_key *keys, void *base, const tal_node *root, tal_report *report) {
+  read_group(report, keys, root, base, NULL);
+}
+
 void tal_scene_read(tal_scene *scene, const tal_node *root, tal_report *report) {
-  read_group(report, tal_schema(), root, (char *)scene, NULL);
+  tal_schema_read(tal_schema(), scene, root, report);
 }
 
 void tal_schema_release(const tal_key *keys, void *base) {

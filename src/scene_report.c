@@ -28,10 +28,23 @@ static tal_error *make_room(tal_report *report, int line) {
   return &errors->item[at];
 }
 
+static void keep(tal_report *report, int line, const tal_error *message) {
+  for (size_t i = 0; i < report->errors->count; i++)
+    if (strcmp(report->errors->item[i].text, message->text) == 0)
+      return;
+  tal_error *slot = make_room(report, line);
+  if (slot)
+    *slot = *message;
+}
+
+void tal_report_line(tal_report *report, const char *text) {
+  tal_error message;
+  tal_fail(&message, TAL_BAD_INPUT, "%s", text);
+  keep(report, INT_MAX, &message);
+}
+
 void tal_report_text(tal_report *report, int line, const char *override, const char *key, const char *what) {
-  tal_error *slot = make_room(report, override ? INT_MAX : line);
-  if (!slot)
-    return;
+  tal_error message;
   char place[400], quoted[104];
   if (override) {
     tal_quote(override, 100, quoted, sizeof quoted);
@@ -41,7 +54,8 @@ void tal_report_text(tal_report *report, int line, const char *override, const c
   } else {
     snprintf(place, sizeof place, "%.300s", report->file);
   }
-  tal_fail(slot, TAL_BAD_INPUT, "%s: %s%s%s", place, key, *key ? ": " : "", what);
+  tal_fail(&message, TAL_BAD_INPUT, "%s: %s%s%s", place, key, *key ? ": " : "", what);
+  keep(report, override ? INT_MAX : line, &message);
 }
 
 void tal_report_add(tal_report *report, const tal_node *at, const char *key, const char *format, ...) {

@@ -1,5 +1,5 @@
 // Collects the messages of a scene: the ten first in file order, whatever the order in which they are found; those of
-// --set come last. Private to scene*.c.
+// --set come last. Private to scene*.c and study*.c.
 #ifndef TAL_SCENE_REPORT_H
 #define TAL_SCENE_REPORT_H
 
@@ -18,5 +18,7 @@ void tal_report_add(tal_report *report, const tal_node *at, const char *key, con
     __attribute__((format(printf, 4, 5)));
 // Same for a line of the file (0: "FILE: what") or, where `override` is given, of --set.
 void tal_report_text(tal_report *report, int line, const char *override, const char *key, const char *what);
+// A message that names its place itself; after all others. The same message is kept only once, here and above.
+void tal_report_line(tal_report *report, const char *text);
 
 #endif

@@ -136,6 +136,8 @@ void tal_scene_resolve(tal_scene *scene, tal_node *root, tal_report *report) {
   resolve_continuum(scene, root);
   resolve_cut(scene);
   resolve_stages(scene, root, report);
-  scene->contact.damping =
-      isnan(scene->contact.damping) && isnan(scene->contact.restitution) ? 0 : scene->contact.damping;
+  if (isnan(scene->contact.restitution))
+    scene->contact.damping = isnan(scene->contact.damping) ? 0 : scene->contact.damping;
+  else if (scene->contact.normal && !strcmp(scene->contact.normal, "hertz") && scene->material.damping == 0)
+    scene->material.damping = nan(""); // else the check complains
 }

@@ -107,7 +107,7 @@ static const tal_key material_keys[] = {
     {KEY("friction", REAL), .fallback = "0", NOT_NEGATIVE, AT(tal_material, friction),
      .help = "coefficient of friction between grains"},
     {KEY("damping", REAL), .unit = "s", .fallback = "0", NOT_NEGATIVE, AT(tal_material, damping),
-     .help = "T of the viscous part T K d^0.5 d' of normal: hertz"},
+     .help = "T of the viscous part T K d^0.5 d' of normal: hertz; or contact.restitution"},
     {.name = NULL}};
 
 static const tal_key contact_keys[] = {
@@ -124,8 +124,11 @@ static const tal_key contact_keys[] = {
      AT(tal_scene_contact, tangential_ratio), .help = "k_t / k_n of the tangential spring"},
     {KEY("stiffness", REAL), .unit = "N/m", ONLY("normal", "linear"), .required = true, POSITIVE,
      AT(tal_scene_contact, stiffness), .help = "normal stiffness"},
-    {KEY("restitution", REAL), ONLY("normal", "linear"), .note = "none: undamped", ABOVE_TO(0, 1),
-     AT(tal_scene_contact, restitution), .help = "delivered speed ratio; in place of damping"},
+    {KEY("restitution", REAL), .note = "none: undamped", ABOVE_TO(0, 1), AT(tal_scene_contact, restitution),
+     .help = "delivered speed ratio of every pair of bodies; in place of damping"},
+    {KEY("restitution_speed", REAL), .unit = "m/s", ONLY("normal", "hertz"), .note = "vR", POSITIVE,
+     AT(tal_scene_contact, restitution_speed),
+     .help = "impact speed at which a pair delivers restitution; required with it when there is no vR"},
     {KEY("damping", REAL), .unit = "N s/m", ONLY("normal", "linear"), .note = "0", NOT_NEGATIVE,
      AT(tal_scene_contact, damping), .help = "normal dashpot; in place of restitution"},
     {.name = NULL}};

@@ -1,5 +1,5 @@
 // The schema: one table that says every scene key's name, type, unit, range, default and meaning. The loader, the
-// canonical text, `talus keys`, the JSON Schema and the shell completion all read it. Private to scene*.c.
+// canonical text, `talus keys`, the JSON Schema and the shell completion all read it. Private to scene*.c and study*.c.
 #ifndef TAL_SCENE_SCHEMA_H
 #define TAL_SCENE_SCHEMA_H
 
@@ -16,7 +16,8 @@ typedef enum tal_key_type {
   TAL_KEY_WHOLES, // owned int64_t array and its count
   TAL_KEY_PAIRS,  // owned double (*)[2] array and its count
   TAL_KEY_GROUP,  // mapping, a struct
-  TAL_KEY_LIST    // list of mappings, owned array of structs and its count
+  TAL_KEY_LIST,   // list of mappings, owned array of structs and its count
+  TAL_KEY_TREE    // anything, `note` says what; the tree's owner reads it, the struct keeps nothing
 } tal_key_type;
 
 typedef struct tal_key tal_key;

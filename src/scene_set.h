@@ -1,4 +1,4 @@
-// Overrides of --set put into the tree before anything is read. Private to scene*.c.
+// Overrides of --set put into the tree before anything is read. Private to scene*.c and study*.c.
 #ifndef TAL_SCENE_SET_H
 #define TAL_SCENE_SET_H
 

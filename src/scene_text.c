@@ -62,6 +62,8 @@ static bool is_set(const tal_key *key, const char *base) {
   case TAL_KEY_BOOL:
   case TAL_KEY_WHOLES:
     return true;
+  case TAL_KEY_TREE:
+    return false;
   }
   return false;
 }

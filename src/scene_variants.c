@@ -75,6 +75,10 @@ static void check_group(tal_report *report, const tal_key *keys, const tal_node 
     check_child(report, keys, node, child, base, at);
 }
 
+void tal_schema_read_variants(const tal_key *keys, const void *base, const tal_node *root, tal_report *report) {
+  check_group(report, keys, root, base, NULL);
+}
+
 void tal_scene_read_variants(const tal_scene *scene, const tal_node *root, tal_report *report) {
-  check_group(report, tal_schema(), root, (const char *)scene, NULL);
+  tal_schema_read_variants(tal_schema(), scene, root, report);
 }

@@ -1,5 +1,5 @@
 // YAML text as a small tree with line numbers: what the scene loader walks. Only the plain part of YAML: mappings,
-// lists and scalars; no anchors, aliases, tags or second document. Private to scene*.c.
+// lists and scalars; no anchors, aliases, tags or second document. Private to scene*.c and study*.c.
 #ifndef TAL_SCENE_YAML_H
 #define TAL_SCENE_YAML_H
 

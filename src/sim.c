@@ -3,6 +3,7 @@
 #include "boundary.h"
 #include "boundary_minimal.h"
 #include "critical.h"
+#include "damping.h"
 #include "effects.h"
 #include "energy.h"
 #include "forces.h"
@@ -41,6 +42,8 @@ static void set_constants(tal_sim *sim) {
   k->skin = scene->skin * 2 * k->mean_radius;
   k->tangential_ratio =
       isnan(scene->contact.tangential_ratio) ? 2 * (1 - nu) / (2 - nu) : scene->contact.tangential_ratio;
+  k->damping_number = tal_damping_number(scene);
+  k->restitution_speed = isnan(scene->contact.restitution_speed) ? k->vR : scene->contact.restitution_speed;
 }
 
 static void add_wall(tal_sim *sim, const tal_scene_wall *plan) {
@@ -105,9 +108,11 @@ static double heaviest_reduced_mass(const tal_sim *sim) {
 // A step that no contact of the scene could bear.
 static tal_status check_scene_step(const tal_sim *sim, tal_error *err) {
   const tal_scene *scene = sim->scene;
-  double critical = tal_critical_step_scene(scene, &sim->constants, heaviest_reduced_mass(sim));
+  const double mass = heaviest_reduced_mass(sim);
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_integrator *plan = &scene->stages[s].integrator;
+    const bool damped = !tal_integrator_find(plan->scheme)->implicit;
+    const double critical = tal_critical_step_scene(scene, &sim->constants, mass, damped);
     const double longest = (double)tal_integrate_longest(plan);
     if (plan->force || !(longest * plan->dt > critical))
       continue;
@@ -165,7 +170,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_contacts_clear(&sim->wall_contacts);
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
-  tal_friction_clear(&sim->sticking);
+  tal_implicit_clear(&sim->implicit);
   tal_rows_clear(&sim->rows);
   free(sim->grain_records);
   free(sim->force_records);
@@ -189,9 +194,10 @@ tal_observed tal_sim_observe(tal_sim *sim) {
   tal_forces_see_now(sim);
   if (sim->boundary && sim->graph.valid)
     sim->boundary->apply(sim);
-  tal_forces_sweep(sim, 0);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_friction_solve(sim, 0.5 * sim->dt, false);
+    tal_implicit_solve(sim, 0.5 * sim->dt, false);
+  else
+    tal_forces_sweep(sim, 0);
   return tal_sim_driving(sim);
 }
 
@@ -303,7 +309,6 @@ void tal_sim_restored(tal_sim *sim) {
   if (sim->boundary && sim->boundary->restored)
     sim->boundary->restored(sim);
   tal_step_effects(sim);
-  sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
-  tal_neighbours_rebuild(sim);
+  tal_neighbours_restore(sim);
   tal_sim_observe(sim); // overlaps: a wall that vanishes in the next step takes its contacts' energy along
 }

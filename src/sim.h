@@ -5,8 +5,8 @@
 #include "boundary_rows.h"
 #include "contacts.h"
 #include "continuum.h"
-#include "friction.h"
 #include "grains.h"
+#include "implicit.h"
 #include "neighbours.h"
 #include "pack.h"
 #include "records.h"
@@ -136,6 +136,8 @@ typedef struct tal_constants {
   double modulus;          // [Pa] young / (1 - poisson^2) of the grains
   double skin;             // [m]
   double tangential_ratio; // k_t / k_n of the spring law
+  // what contact.restitution asks for: beta or zeta of eqs (60), (5), NAN without it; [m/s] where Hertz delivers it
+  double damping_number, restitution_speed;
 } tal_constants;
 
 struct tal_sim {
@@ -148,7 +150,7 @@ struct tal_sim {
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
   tal_force_record *force_records; // owned; [pairs.capacity] what they answer
   tal_neighbours neighbours;
-  tal_friction_system sticking; // scratch of friction solved implicitly
+  tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;
   tal_rows rows; // of a minimal boundary
   tal_run run;

@@ -56,7 +56,7 @@ static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_erro
   return TAL_OK;
 }
 
-// (61): the height goes down by the same amount in any time.
+// (81): the height goes down by the same amount in any time.
 static void target(const tal_sim *sim, const tal_scene_stage *plan, tal_boundary_target *out) {
   const tal_run *run = &sim->run;
   double strain = run->axial_start + plan->rate * (run->time - run->stage_start);

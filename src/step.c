@@ -3,6 +3,7 @@
 
 #include "boundary.h"
 #include "critical.h"
+#include "damping.h"
 #include "effects.h"
 #include "energy.h"
 #include "forces.h"
@@ -43,13 +44,6 @@ static bool any_friction(const tal_sim *sim) {
   return false;
 }
 
-static bool any_damping(const tal_sim *sim) {
-  const tal_scene_contact *law = &sim->scene->contact;
-  if (tal_normal_law_find(law->normal)->effects & TAL_EFFECT_HERTZ)
-    return sim->scene->material.damping > 0;
-  return law->restitution < 1 || law->damping > 0;
-}
-
 static const char *scheme(const tal_sim *sim) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   return plan ? plan->integrator.scheme : sim->scene->integrator.scheme;
@@ -58,7 +52,7 @@ static const char *scheme(const tal_sim *sim) {
 void tal_step_effects(tal_sim *sim) {
   const tal_scene *scene = sim->scene;
   unsigned effects = tal_normal_law_find(scene->contact.normal)->effects;
-  if (any_damping(sim))
+  if (tal_damping_any(scene))
     effects |= TAL_EFFECT_DAMPING;
   if (any_friction(sim))
     effects |= tal_tangential_law_find(scene->contact.tangential)->effects;
@@ -72,7 +66,7 @@ void tal_step_effects(tal_sim *sim) {
     effects |= TAL_EFFECT_WALLS;
   if (any_held_motion(&sim->grains))
     effects |= TAL_EFFECT_HELD;
-  if ((effects & TAL_EFFECT_FRICTION) && tal_integrator_find(scheme(sim))->implicit)
+  if ((effects & (TAL_EFFECT_FRICTION | TAL_EFFECT_DAMPING)) && tal_integrator_find(scheme(sim))->implicit)
     effects |= TAL_EFFECT_IMPLICIT;
   sim->effects = effects;
 }
@@ -187,6 +181,7 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   tal_grains *g = &sim->grains;
   if (run->strain_begun && sim->graph.valid && run->refresh_area > 0)
     run->log_volume += log(geo_loop_area(&sim->graph.loop, g->x, g->y) / run->refresh_area);
+  tal_plates_mark(sim);
   tal_status status = tal_graph_refresh(&sim->graph, g, err);
   if (status)
     return status;

@@ -17,6 +17,7 @@
 #include "critical.h"
 #include "energy.h"
 #include "figures.h"
+#include "impact.h"
 #include "output.h"
 #include "run.h"
 #include "scene.h"

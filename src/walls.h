@@ -23,6 +23,7 @@
   X(double, fy, "N", STATE, "force of the grains on the wall at the last step")                                        \
   X(double, contact_stiffness, "N/m", STATE, "sum of the tangent stiffness of its contacts at the last step")          \
   X(double, contact_damping, "N s/m", STATE, "sum of the damping coefficients of its contacts at the last step")       \
+  X(double, contact_vy, "m/s", STATE, "mean vertical velocity of its touching grains, weighted by that stiffness")     \
   X(double, friction_fx, "N", STATE, "tangential part of that force")                                                  \
   X(double, friction_fy, "N", STATE, "tangential part of that force")                                                  \
   X(double, damping_fx, "N", STATE, "viscous part of that force")                                                      \
@@ -30,8 +31,8 @@
   X(double, work, "J", STATE, "work done by the wall on the grains")                                                   \
   X(double, friction_work, "J", STATE, "its part through tangential forces")                                           \
   X(double, damping_work, "J", STATE, "its part through viscous forces")                                               \
-  X(double, x_list, "m", WORK, "first end when the neighbour list was built")                                          \
-  X(double, y_list, "m", WORK, "first end when the neighbour list was built")                                          \
+  X(double, x_list, "m", STATE, "first end when the neighbour list was built")                                         \
+  X(double, y_list, "m", STATE, "first end when the neighbour list was built")                                         \
   X(double, listed, "1", STATE, "1: there when the neighbour list was built")
 
 typedef struct tal_wall {

@@ -34,7 +34,9 @@ static void take_slot(const tal_sim *sim, tal_wall *wall, size_t c) {
   if (s->overlap[c] <= 0)
     return;
   int hertz = (sim->effects & TAL_EFFECT_HERTZ) != 0;
-  wall->contact_stiffness += hertz ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
+  double slope = hertz ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
+  wall->contact_stiffness += slope;
+  wall->contact_vy += slope * sim->grains.vy[s->i[c]];
   wall->contact_damping += hertz ? s->damping[c] * root : s->damping[c];
 }
 
@@ -42,10 +44,14 @@ void tal_walls_take_loads(tal_sim *sim, double dt) {
   for (size_t w = 0; w < sim->walls.count; w++) {
     tal_wall *wall = &sim->walls.wall[w];
     wall->fx = wall->fy = wall->friction_fx = wall->friction_fy = wall->damping_fx = wall->damping_fy = 0;
-    wall->contact_stiffness = wall->contact_damping = 0;
+    wall->contact_stiffness = wall->contact_damping = wall->contact_vy = 0;
   }
   for (size_t c = 0; c < sim->wall_contacts.count; c++)
     take_slot(sim, &sim->walls.wall[sim->wall_contacts.j[c]], c);
-  for (size_t w = 0; dt > 0 && w < sim->walls.count; w++)
-    half_work(&sim->walls.wall[w], dt);
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    tal_wall *wall = &sim->walls.wall[w];
+    wall->contact_vy = wall->contact_stiffness > 0 ? wall->contact_vy / wall->contact_stiffness : 0;
+    if (dt > 0)
+      half_work(wall, dt);
+  }
 }

@@ -9,6 +9,7 @@
 
 #include "checkpoint.h"
 #include "engine.h"
+#include "forces.h"
 #include "physics.h"
 #include "small_run.h"
 
@@ -45,6 +46,7 @@ static engine *through_a_file(engine *e) {
   tal_run_files files = {0};
   tal_error err = {""};
   char *text = tal_scene_text(&e->scene);
+  tal_forces_expand(e->sim); // as a run does: which slots touch
   assert_int_equal(tal_checkpoint_write(path, NULL, e->sim, text, &files, &err), TAL_OK);
   draft *d = draft_begin();
   fputs(text, d->to);

@@ -144,8 +144,8 @@ static double mean_speed(const tal_grains *g) {
 }
 
 // MODEL: at the end the stress, summed here from the contacts, is 100 kPa within 1 % in both directions; each plate
-// bears p h times the distance of the outermost grains on it; nothing moves: the grains would take a thousand times as
-// long as the ramp to go their own radius; shear is small.
+// bears p h times the distance of the outermost grains on it; nothing moves faster than the unbalanced force that is
+// allowed would make it move within a ramp, the plates a hundred times slower; shear is small.
 static void end_of_confinement(void **state) {
   (void)state;
   engine *e = sample("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
@@ -163,14 +163,17 @@ static void end_of_confinement(void **state) {
   geo_tensor stress = geo_tensor_scale(1 / (area * thickness), moment);
   assert_true(fabs(stress.xx / pressure - 1) <= 0.01 && fabs(stress.yy / pressure - 1) <= 0.01);
   assert_true(fabs(stress.xy) < 0.05 * pressure && fabs(stress.yx) < 0.05 * pressure);
+  tal_macro macro;
+  tal_macro_measure(&seen, &macro);
+  const double slow = 1e-3 * macro.mean_force / sim->constants.mean_mass * 0.5;
   for (int side = 1; side >= -1; side -= 2) {
     const tal_wall *plate = tal_walls_plate(&sim->walls, side);
     double width = outermost(sim, side, 1) - outermost(sim, side, -1), load = -side * plate->fy;
     if (!(fabs(load - pressure * thickness * width) < 0.01 * load))
       fail_msg("plate %d bears %.4g N, p h width is %.4g N", side, load, pressure * thickness * width);
-    assert_true(fabs(plate->vy) < 2e-3 * sim->constants.mean_radius / 0.5);
+    assert_true(fabs(plate->vy) < 0.01 * slow);
   }
-  assert_true(mean_speed(&sim->grains) < 0.01 * sim->constants.mean_radius / 0.5);
+  assert_true(mean_speed(&sim->grains) < slow);
   assert_true(sim->run.rest <= 1e-3 && sim->run.pressure == pressure);
   engine_end(e);
 }
@@ -250,11 +253,11 @@ static void follow_step(engine *e, double start, double *before, size_t *nodes, 
 // Follows a compression to 1 % whose graph is renewed every `refresh` steps.
 static strains compressed(int refresh) {
   char more[400];
-  snprintf(
-      more, sizeof more,
-      "continuum: {refresh: %d}\ncontact: {tangential: spring}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.5, "
-      "friction: 0.3, tolerance: 0.1, unbalanced: 0.01}, {kind: compress, rate: %de-3, strain: 0.01}]\n",
-      refresh, RATE_PER_THOUSAND);
+  snprintf(more, sizeof more,
+           "continuum: {refresh: %d, peel: 0.3}\ncontact: {tangential: spring}\nstages: [{kind: confine, pressure: "
+           "100e3, ramp: 0.5, "
+           "friction: 0.3, tolerance: 0.1, unbalanced: 0.01}, {kind: compress, rate: %de-3, strain: 0.01}]\n",
+           refresh, RATE_PER_THOUSAND);
   engine *e = sample(more);
   tal_sim *sim = e->sim;
   while (!sim->run.stage_done)

@@ -179,7 +179,7 @@ static engine *sample(const char *shape, const char *friction, const char *integ
           "material: {young: 1e8, density: 2675, %s, damping: 1e-3}\nmass_scaling: 1e4\n"
           "contact: {exponent: 10, vR: 1e-3}\npack: {width: 24e-3%s}\ncontinuum: {refresh: 20}\n"
           "integrator: {%s}\nstages:\n"
-          "  - {kind: confine, pressure: 1e5, ramp: 0.05, tolerance: 0.5, unbalanced: 1, friction: 0.1}\n%s",
+          "  - {kind: confine, pressure: 1e5, ramp: 0.05, tolerance: 0.1, unbalanced: 0.1, friction: 0.1}\n%s",
           friction, shape, integrator, stages);
   return engine_start(d);
 }

@@ -68,7 +68,7 @@ static void scatter(assembly *a, size_t count, double size, uint64_t *seed) {
 static int peel(assembly *a, double gap_limit) {
   const geo_delaunay_backend *backend = geo_delaunay_backend_find("qhull");
   assert_int_equal(geo_delaunay(backend, a->x, a->y, NULL, a->n, &a->mesh, NULL), GEO_DELAUNAY_OK);
-  return geo_loop_peel(&a->loop, &a->mesh, a->x, a->y, a->radius, gap_limit, a->inside);
+  return geo_loop_peel(&a->loop, &a->mesh, a->x, a->y, a->radius, NULL, gap_limit, a->inside);
 }
 
 static double turn(const assembly *a, int32_t p, int32_t q, int32_t r) {

@@ -43,6 +43,10 @@ static const bad_scene bad_scenes[] = {
     {"unknown stage", 10, "stages: [{kind: squeeze, duration: 1}]", 2, ":10: stages[0].kind: 'squeeze' is not known"},
     {"key twice", 2, "name: again", 2, ":2: the key 'name' is given twice"},
     {"not YAML", 5, "contact: {normal: [hertz, tangential: spring}", 2, ":5: "},
+    {"restitution without a speed", 5, "contact: {normal: hertz, tangential: spring, restitution: 0.5}", 2,
+     ":5: contact.restitution_speed: is missing, and neither contact.vR nor a stage with a rate gives one"},
+    {"restitution zero", 5, "contact: {restitution: 0, restitution_speed: 1, tangential: spring}", 2,
+     ":5: contact.restitution: '0' is out of range; accepted: a number in (0, 1]"},
     {"dt above critical, by the scene alone", 5,
      "contact: {normal: linear, stiffness: 1e8, damping: 0, tangential: none}", 2,
      ":9: integrator.dt: 1e-06 s is above the critical step"},
@@ -76,10 +80,16 @@ typedef struct bad_line {
 } bad_line;
 
 static const bad_line bad_lines[] = {
-    {{"fly"}, 2, "talus: fly: unknown command; accepted: run, check, plot, verify, keys"},
+    {{"fly"}, 2, "talus: fly: unknown command; accepted: run, check, impact, plot, verify, keys"},
     {{"--fly"}, 2, "talus: --fly: unknown option"},
     {{"run"}, 2, "talus run: SCENE.yaml: is missing"},
     {{"check"}, 2, "talus check: SCENE.yaml: is missing"},
+    {{"impact"}, 2, "talus impact: SCENE.yaml: is missing"},
+    {{"impact", "s.yaml", "-o", "out"}, 2, "s.yaml: contact.vR: is missing, and neither a stage with a rate nor"},
+    {{"impact", "s.yaml", "-o", "s.yaml", "--set", "contact={normal: linear, stiffness: 1e3, tangential: spring}"},
+     4,
+     "cannot make the folder"},
+    {{"impact", "none.yaml"}, 2, "none.yaml: cannot be read"},
     {{"plot"}, 2, "talus plot: DIR: is missing"},
     {{"verify"}, 2, "talus verify: DIR: is missing"},
     {{"run", "s.yaml", "t.yaml", "-o", "out"}, 2, "talus run: t.yaml: is one word too many"},
@@ -159,12 +169,91 @@ static void test_questions(void **state) {
   free(after);
 }
 
+// Value of a column (from 0) in line `line` (from 0: the head) of a CSV text.
+static double csv_value(const char *text, int line, int column) {
+  for (; line > 0; line--)
+    text = strchr(text, '\n') + 1;
+  for (; column > 0; column--)
+    text = strchr(text, ',') + 1;
+  return strtod(text, NULL);
+}
+
+// MODEL: `impact` leaves a table that falls in restitution and contact time with damping, and a picture; the scene's
+// own values, which `check` prints, lie on it: e = 0.4 at its restitution_speed.
+static void test_impact(void **state) {
+  program *p = *state;
+  outcome got;
+  write_scene(p, 5, "contact: {restitution: 0.4, restitution_speed: 0.2, tangential: spring}");
+  program_run(p, WORDS("impact", "s.yaml", "-o", "out"), &got);
+  assert_outcome("impact", &got, 0, "");
+  assert_string_equal(got.out, "out/impact.csv\nout/impact.png\n");
+  assert_int_equal(access(program_path(p, "out/impact.png"), R_OK), 0);
+  char text[40000] = "";
+  FILE *file = fopen(program_path(p, "out/impact.csv"), "r");
+  assert_non_null(file);
+  assert_true(fread(text, 1, sizeof text - 1, file) > 1000);
+  fclose(file);
+  assert_int_equal(strncmp(text, "damping_number,damping[s],restitution,contact_time[s],contact_time_over_t0\n", 75),
+                   0);
+  const int lines = count_lines(text);
+  assert_true(lines > 100 && csv_value(text, 1, 2) > 0.998 && csv_value(text, lines - 1, 2) < 0.01);
+  for (int line = 2; line < lines; line++) {
+    assert_true(csv_value(text, line, 1) > csv_value(text, line - 1, 1));
+    assert_true(csv_value(text, line, 2) < csv_value(text, line - 1, 2));
+    assert_true(csv_value(text, line, 3) < csv_value(text, line - 1, 3));
+  }
+  program_run(p, WORDS("check", "s.yaml"), &got);
+  assert_outcome("check", &got, 0, "");
+  assert_non_null(strstr(got.out, "at restitution_speed = 0.2 m/s: e 0.4, contact "));
+  program_run(p,
+              WORDS("check", "s.yaml", "--set",
+                    "contact={normal: linear, stiffness: 1e3, restitution: 0.7, tangential: spring}"),
+              &got);
+  assert_outcome("check linear", &got, 0, "");
+  assert_non_null(strstr(got.out, "at any speed: e 0.7, contact "));
+}
+
+static bool file_has(program *p, const char *name, const char *words) {
+  char text[20000] = "";
+  FILE *file = fopen(program_path(p, name), "r");
+  assert_non_null(file);
+  assert_true(fread(text, 1, sizeof text - 1, file) > 0);
+  fclose(file);
+  return strstr(text, words) != NULL;
+}
+
+// MODEL: a compression that is too fast for its masses is named by `check`, with the mass_scaling that would still do,
+// and by the run's warnings; at that mass_scaling neither complains.
+static void test_quasistatic(void **state) {
+  program *p = *state;
+  outcome got;
+  const char *scaling = NULL;
+  char set[80], warned[40], answer[sizeof got.out];
+  write_scene(p, 10, "stages: [{kind: compress, pressure: 100, rate: 0.5, strain: 1e-3}]");
+  for (int slow = 0; slow < 2; slow++) {
+    snprintf(set, sizeof set, "mass_scaling=%g", slow ? 0.9 * strtod(scaling, NULL) : 1e5);
+    program_run(p, WORDS("check", "s.yaml", "--set", set), &got);
+    assert_outcome("check", &got, 0, "");
+    assert_int_equal(strstr(got.out, "is not quasi-static: phi above 0.01") != NULL, !slow);
+    memcpy(answer, got.out, sizeof answer);
+    scaling = strstr(answer, "phi is 0.01 at mass_scaling ");
+    assert_non_null(scaling);
+    scaling += strlen("phi is 0.01 at mass_scaling ");
+    double bound = strtod(scaling, NULL);
+    snprintf(warned, sizeof warned, "%s", slow ? "still" : "heavy");
+    program_run(p, WORDS("run", "s.yaml", "-o", warned, "-q", "--no-figures", "--set", set), &got);
+    assert_outcome("run", &got, 0, "");
+    strcat(warned, "/run.json");
+    assert_int_equal(file_has(p, warned, "phi reached "), !slow);
+    assert_true(bound > 0 && (slow ? bound > strtod(set + strlen("mass_scaling="), NULL) : bound < 1e5));
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      program_test(test_bad_scenes),
-      program_test(test_step_above_critical_of_the_packing),
-      program_test(test_bad_lines),
-      program_test(test_questions),
+      program_test(test_bad_scenes), program_test(test_step_above_critical_of_the_packing),
+      program_test(test_bad_lines),  program_test(test_questions),
+      program_test(test_impact),     program_test(test_quasistatic),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

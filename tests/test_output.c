@@ -506,7 +506,7 @@ static void test_report(void **state) {
   tal_output *output = create(&run);
   write_checkpoint(output, run.sim);
   assert_true(tal_output_stages_before(output)[1].wall_time == 0);
-  const tal_stage_report stages[2] = {{"free", 1000, 1.5, 1e6}, {"free", 17, 0.25, (double)NAN}};
+  const tal_stage_report stages[2] = {{"free", 1000, 1.5, 1e6, 1.25}, {"free", 17, 0.25, (double)NAN, 0.5}};
   const char *const warnings[] = {"a \"quoted\" \\ line\nand \x01 \xff more"};
   const tal_run_report report = {.status = "interrupted",
                                  .reason = "",
@@ -523,6 +523,7 @@ static void test_report(void **state) {
     fail_msg("%s", err.text);
   assert_int_equal(tal_output_stages_before(output)[1].steps, 17);
   assert_true(tal_output_stages_before(output)[0].wall_time == 1.5);
+  assert_true(tal_output_stages_before(output)[0].cpu_time == 1.25);
   tal_output_close(output);
   char path[TAL_PATH_SIZE], command[TAL_PATH_SIZE + 200];
   size_t size;

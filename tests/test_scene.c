@@ -215,7 +215,9 @@ static void test_contact_choices(void **state) {
       {{"material.friction=0", "contact.vR=1"}, "hertz", "regularised"},
       {{"material.friction=0.2", "contact.tangential_ratio=0.8"}, "hertz", "spring"},
       {{"contact={normal: linear, stiffness: 1e5, restitution: 0.5}", "material.damping=0"}, "linear", "regularised"},
-      {{"contact={normal: linear, stiffness: 1e5}", "material.damping=0"}, "linear", "regularised"}};
+      {{"contact={normal: linear, stiffness: 1e5}", "material.damping=0"}, "linear", "regularised"},
+      {{"contact.restitution=0.5", "material.damping=0"}, "hertz", "regularised"},
+      {{"contact={restitution: 0.5, restitution_speed: 2}", "material.damping=0"}, "hertz", "regularised"}};
   scene_folder folder = scene_folder_create();
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
     tal_scene s;
@@ -233,6 +235,11 @@ static void test_contact_choices(void **state) {
     if (i == 6) {
       assert_true(isnan(s.contact.restitution));
       same(s.contact.damping, 0);
+    }
+    if (i >= 7) {
+      same(s.contact.restitution, 0.5);
+      assert_true(isnan(s.material.damping));
+      assert_true(i == 7 ? isnan(s.contact.restitution_speed) : s.contact.restitution_speed == 2);
     }
     tal_scene_clear(&s);
   }
@@ -305,6 +312,7 @@ static void test_round_trip(void **state) {
       "name: it's \"quoted\" # not this\ngrains: {list: [{x: 0.1, y: 1e-300, r: 0.3333333333333333}]}\n",
       "name: 'true'\ngrains: {list: [{x: 0, y: 0, r: 1}]}\nseed: 9223372036854775807\n",
       "grains: {list: [{x: 0, y: 0, r: 1}]}\ncontact: {normal: linear, stiffness: 1e5, restitution: 0.9}\n",
+      "grains: {list: [{x: 0, y: 0, r: 1}]}\ncontact: {restitution: 0.3, restitution_speed: 0.1}\n",
       "grains: {list: [{x: 0, y: 0, r: 1}]}\ncontact: {normal: linear, stiffness: 1e5, damping: 3, tangential: "
       "spring}\n"};
   scene_folder folder = scene_folder_create();
@@ -477,7 +485,7 @@ static void test_keys(void **state) {
               {"contact", "contact.vR", "material"},
               {"grains.radius.sieve", "grains.radius.passing", "grains.radius.median"},
               {"contact.tangential", "regularised with friction, else none", "exponent"}};
-  static const char *const unknown[] = {"foo", "stages.spin", "material.youn", "contact.hertz", ".", "stages."};
+  static const char *const unknown[] = {"foo", "stages.spin", "material.youn", "contact.hurtz", ".", "stages."};
   bool found;
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
     char *text = printed_keys(rows[i].what, &found);

@@ -177,7 +177,20 @@ static const bad_line bad_lines[] = {
     // impossible combinations
     {4, "contact: {normal: hertz, stiffness: 1e5}", 4, "contact.stiffness",
      "has no effect with normal: hertz; accepted: only with normal: linear"},
-    {4, "contact: {normal: hertz, restitution: 0.5}", 4, "contact.restitution", "has no effect with normal: hertz"},
+    {4, "contact: {normal: hertz, restitution: 0.5}", 3, "material.damping",
+     "stands beside contact.restitution; accepted: one of the two (material.damping: 0 counts as none)"},
+    {4, "contact: {restitution: 0}\nmaterial: {young: 1e9, density: 1}", 4, "contact.restitution",
+     "'0' is out of range; accepted: a number in (0, 1]"},
+    {4, "contact: {restitution: 1.01}\nmaterial: {young: 1e9, density: 1}", 4, "contact.restitution",
+     "'1.01' is out of range; accepted: a number in (0, 1]"},
+    {4, "contact: {restitution: 0.5, restitution_speed: 0}\nmaterial: {young: 1e9, density: 1}", 4,
+     "contact.restitution_speed", "'0' is out of range; accepted: a number in m/s > 0"},
+    {4, "contact: {restitution: .nan}\nmaterial: {young: 1e9, density: 1}", 4, "contact.restitution",
+     "accepted: a number"},
+    {4, "contact: {restitution_speed: 1}", 4, "contact.restitution_speed",
+     "has no effect without contact.restitution; accepted: both or none"},
+    {4, "contact: {normal: linear, stiffness: 1, restitution: 0.5, restitution_speed: 1}\nmaterial: {density: 1}", 4,
+     "contact.restitution_speed", "has no effect with normal: linear; accepted: only with normal: hertz"},
     {4, "contact: {tangential: none, exponent: 20}", 4, "contact.exponent", "only with tangential: regularised"},
     {4, "contact: {tangential: none, tangential_ratio: 1}", 4, "contact.tangential_ratio",
      "only with tangential: spring"},
@@ -393,6 +406,8 @@ static void test_bad_overrides(void **state) {
               {"seed=1\n---\n2", "seed", "a second document"},
               {"material.young.x=1", "material.young", "is a mapping; accepted: a number"},
               {"contact.normal=linear", "", ""},
+              {"contact.restitution=0.5", "contact.restitution",
+               "stands beside material.damping; accepted: one of the two (material.damping: 0 counts as none)"},
               {"pack.width=0.5e-3", "pack.width", "too narrow"}};
   scene_folder folder = scene_folder_create();
   char text[2000];

@@ -1,0 +1,86 @@
+// Friction and normal damping of all contacts solved together at velocity level (scheme implicit_friction), eqs
+// (50)-(56): each contact's forces are the law's answer to the velocities that the kick of all forces leaves behind,
+// found by sweeps over the contacts that correct both bodies at once (Gauss-Seidel), from the forces of the last step
+// on. Contacts are taken colour by colour; contacts of one colour share no grain, so the order within a colour and the
+// number of threads do not matter. Equal and opposite impulses with the arms r - d/2 keep momentum and angular
+// momentum.
+#ifndef TAL_IMPLICIT_H
+#define TAL_IMPLICIT_H
+
+#include "base.h"
+#include "lanes.h"
+#include "law_implicit.h"
+#include <stdbool.h>
+
+struct tal_sim;
+
+// One lane per listed slot, wall slots too, in the order of the sweeps; every colour is filled up to whole vectors with
+// lanes that push nobody. X(name, unit, meaning)
+#define TAL_LANE_FIELDS(X)                                                                                             \
+  X(stiffness, "N/m^1.5 | N/m", "slot's")                                                                              \
+  X(damping, "N s/m^1.5 | N s/m", "slot's")                                                                            \
+  X(friction, "1", "slot's")                                                                                           \
+  X(radius_i, "m", "of grain i")                                                                                       \
+  X(reach, "m", "sum of the radii")                                                                                    \
+  X(share_i, "1", "of the overlap that shortens i's arm: half of it, all of it at a wall")                             \
+  X(mass_i, "1/kg", "inverse")                                                                                         \
+  X(mass_j, "1/kg", "inverse")                                                                                         \
+  X(inertia_i, "1/(kg m^2)", "inverse")                                                                                \
+  X(inertia_j, "1/(kg m^2)", "inverse")                                                                                \
+  X(nx, "1", "unit normal into i, this step")                                                                          \
+  X(ny, "1", "unit normal into i, this step")                                                                          \
+  X(overlap, "m", "this step")                                                                                         \
+  X(arm_i, "m", "this step")                                                                                           \
+  X(arm_j, "m", "this step")                                                                                           \
+  X(elastic, "N", "elastic normal force, this step")                                                                   \
+  X(viscosity, "N s/m", "normal force per speed of approach, this step")                                               \
+  X(approach, "m/s", "at the start of the kick")                                                                       \
+  X(slip, "m/s", "at the start of the kick")                                                                           \
+  X(fn, "N", "normal force found so far")                                                                              \
+  X(ft, "N", "tangential force found so far, on i along t = (-ny, nx)")                                                \
+  X(spring, "N", "spring law: force of the spring at this instant")                                                    \
+  X(spring_stiffness, "N/m", "spring law: at this instant")
+
+// A grain, or what a wall slot meets: place and velocities (v, v, spin, spin), at the end of the kick with the forces
+// found so far and at its start.
+typedef struct tal_implicit_body {
+  tal_v4 place; // x, y [m]
+  tal_v4 now, before;
+} tal_implicit_body;
+
+typedef struct tal_implicit {
+  tal_implicit_body *body; // owned; [body_capacity] grains, wall slots, one that nobody moves
+  size_t body_capacity;
+  size_t lanes, capacity;
+  int32_t *i, *j;                            // owned; [capacity] bodies
+  int32_t *slot;                             // owned; [capacity] in sim->pairs; ~ of it in sim->wall_contacts
+  bool *filler;                              // owned; [capacity] lanes that only fill a vector
+  double *partial;                           // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] work of each block
+#define X(name, unit, meaning) double *name; // owned; [capacity]
+  TAL_LANE_FIELDS(X)
+#undef X
+  size_t colour_count;
+  size_t first[66]; // first lane of each colour
+  bool serial_last; // the last colour holds what found no free one, a vector each: swept in order by one thread
+  uint64_t listed;  // neighbour list these lanes were made from
+  int64_t sweeps;   // since the start, for reports
+} tal_implicit;
+
+// Lanes of a vector.
+enum { TAL_IMPLICIT_VECTOR = 8 };
+
+void tal_implicit_init(tal_implicit *system);
+void tal_implicit_clear(tal_implicit *system);
+// Forces of all slots for a kick of `kick` seconds that starts from the grains' velocities as they stand, with the
+// boundary forces: into the force records and the wall slots. A step (`advances`) keeps the forces as the next step's
+// start and moves the springs; an observation does not.
+void tal_implicit_solve(struct tal_sim *sim, double kick, bool advances);
+
+// Lanes for the slots of the present neighbour list: colours, and what does not change until the next list.
+void tal_implicit_list(struct tal_sim *sim);
+// Deals `count` contacts of bodies (i, j) to colours: no two contacts of a colour share a body below `grains`. What
+// finds none of the 64 goes into a last one (*serial_last). Returns the number of colours; colour[k] of contact k.
+size_t tal_implicit_colours(const int32_t *i, const int32_t *j, size_t count, size_t grains, uint8_t *colour,
+                            bool *serial_last);
+
+#endif
