@@ -2,7 +2,8 @@
 
 #include <string.h>
 
-static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, &tal_boundary_minimal, NULL};
+static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, &tal_boundary_membrane, &tal_boundary_minimal,
+                                                 NULL};
 
 const tal_boundary *tal_boundary_find(const char *name) {
   for (const tal_boundary *const *k = boundaries; *k; k++)

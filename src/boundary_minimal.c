@@ -23,7 +23,8 @@ static tal_boundary_target target_of(const tal_sim *sim) {
   return target;
 }
 
-void tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan) {
+tal_status tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
+  (void)err;
   tal_run *run = &sim->run;
   tal_plates_remove(sim);
   sim->boundary = tal_boundary_find("minimal");
@@ -36,6 +37,7 @@ void tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan) {
     run->log_volume = 0;
     run->refresh_area = 0; // what happened before does not count
   }
+  return TAL_OK;
 }
 
 void tal_minimal_before_step(tal_sim *sim) {
@@ -313,6 +315,7 @@ static tal_status check(const tal_sim *sim, tal_error *err) {
 const tal_boundary tal_boundary_minimal = {
     .name = "minimal",
     .help = "no plates: imposed components of the mean velocity gradient of the Delaunay boundary",
+    .begin = tal_minimal_begin,
     .refreshed = refreshed,
     .apply = apply,
     .start = start,

@@ -14,7 +14,7 @@ typedef struct tal_boundary_target {
 } tal_boundary_target;
 
 // Sets the stage up: plates go, the loop is pressed all round.
-void tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan);
+tal_status tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
 // Adds the strain of the step that is about to be taken.
 void tal_minimal_before_step(tal_sim *sim);
 // The mean gradient of the coming step less the imposed one, NAN where nothing is imposed: xx, yy, xy [1/s].

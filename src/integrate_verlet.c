@@ -44,6 +44,8 @@ void tal_integrate_drift(tal_sim *sim, double dt) {
   drift_all(sim, dt);
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_drift(sim);
+  if (sim->boundary && sim->boundary->drift)
+    sim->boundary->drift(sim, dt);
   if (tal_neighbours_stale(sim))
     tal_neighbours_rebuild(sim);
   if (sim->boundary)
@@ -57,6 +59,8 @@ void tal_integrate_finish(tal_sim *sim) {
     sim->run.correcting_work += credit * sim->run.correcting_power;
   }
   tal_forces_finish_step(sim, sim->dt, credit);
+  if (sim->boundary && sim->boundary->finish)
+    sim->boundary->finish(sim, sim->dt, credit);
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
 }

@@ -107,6 +107,15 @@ typedef struct tal_scene_stresses {
   double xx, yy, xy;
 } tal_scene_stresses;
 
+// Bead chains of boundary: membrane.
+typedef struct tal_scene_membrane {
+  double stiffness; // [N/m] of a link
+  double prestress; // [N] tension of the links while they are a straight line
+  double radius;    // [m] of a bead, NAN: 1.25 mean radii
+  double mass;      // [kg] of a bead, NAN: that of a grain of its radius
+  double damping;   // [-] of a link, share of critical
+} tal_scene_membrane;
+
 typedef struct tal_scene_stage {
   const char *kind;                // name of a registered stage: free, confine, compress, shear, deform
   const char *boundary;            // name of a registered boundary (shear, deform: minimal; resolved by the loader)
@@ -122,6 +131,7 @@ typedef struct tal_scene_stage {
   double timeout;                  // [s] confine: fails after this long, default 20 ramp + 20 s
   double rate;                     // [1/s] compress, shear (may be negative); deform: largest of rates, by the loader
   double strain;                   // [-] compress, shear
+  tal_scene_membrane membrane;     // compress with boundary: membrane
   tal_scene_rates rates;           // deform
   tal_scene_stresses stresses;     // deform
   tal_scene_integrator integrator; // the stage's own, else a copy of the scene's

@@ -326,6 +326,9 @@ static void check_method(const stage_place *at, const tal_scene_stage *stage) {
     if (tal_node_get(at->node, keys[k]))
       wrong_stage(at, keys[k], "has no effect with boundary: %s; accepted: only with boundary: minimal",
                   stage->boundary);
+  if (stage->boundary && !named(stage->boundary, "membrane") && tal_node_get(at->node, "membrane"))
+    wrong_stage(at, "membrane", "has no effect with boundary: %s; accepted: only with boundary: membrane",
+                stage->boundary);
   if (!minimal || !stage->method)
     return;
   if (exact && tal_node_get(at->node, "penalty"))

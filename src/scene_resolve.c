@@ -87,6 +87,9 @@ static void resolve_boundary(tal_scene_stage *stage, const tal_node *node) {
   bool deforms = strcmp(kind, "shear") == 0 || strcmp(kind, "deform") == 0;
   if (deforms)
     stage->boundary = named("minimal", tal_boundary_choices);
+  const double none = nan("");
+  if (!stage->boundary || strcmp(stage->boundary, "membrane") != 0)
+    stage->membrane = (tal_scene_membrane){none, none, none, none, none};
   bool minimal = stage->boundary && strcmp(stage->boundary, "minimal") == 0;
   if (!minimal) {
     stage->method = NULL;

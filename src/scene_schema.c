@@ -248,6 +248,19 @@ static const tal_key stage_integrator_keys[] = {
      .help = "runs above the critical time step, at the user's risk"},
     {.name = NULL}};
 
+static const tal_key membrane_keys[] = {
+    {KEY("stiffness", REAL), .unit = "N/m", .fallback = "1e4", POSITIVE, AT(tal_scene_membrane, stiffness),
+     .help = "of a link against stretching [P: 10 N/mm]; a link shorter than at rest is slack"},
+    {KEY("prestress", REAL), .unit = "N", .fallback = "0", NOT_NEGATIVE, AT(tal_scene_membrane, prestress),
+     .help = "tension of a link before the membrane is laid; 0: it just fits the height of the sample"},
+    {KEY("radius", REAL), .unit = "m", .note = "1.25 mean radii", POSITIVE, AT(tal_scene_membrane, radius),
+     .help = "of a bead: larger than the grains, so that none slips through; links are two radii long"},
+    {KEY("mass", REAL), .unit = "kg", .note = "of a grain of that radius, scaled", POSITIVE,
+     AT(tal_scene_membrane, mass), .help = "of a bead"},
+    {KEY("damping", REAL), .fallback = "0.2", NOT_NEGATIVE, AT(tal_scene_membrane, damping),
+     .help = "of a link, as a share of critical"},
+    {.name = NULL}};
+
 static const tal_key rate_keys[] = {
     {KEY("xx", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, xx), .help = "dvx/dx"},
     {KEY("yy", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, yy), .help = "dvy/dy"},
@@ -283,6 +296,8 @@ static const tal_key stage_keys[] = {
      AT(tal_scene_stage, timeout), .help = "fails after this long, saying what was reached"},
     {KEY("boundary", CHOICE), ONLY("kind", "compress"), .fallback = "pressure", CHOOSE(tal_boundary_choices),
      AT(tal_scene_stage, boundary), .help = "lateral boundary, or minimal for no plates at all"},
+    {KEY("membrane", GROUP), ONLY("kind", "compress"), .optional = true, .note = "with boundary: membrane",
+     AT(tal_scene_stage, membrane), .keys = membrane_keys, .help = "the beads of boundary: membrane"},
     {KEY("method", CHOICE), ONLY("kind", "compress shear deform"), .note = "exact with minimal boundaries",
      CHOOSE(tal_method_choices), AT(tal_scene_stage, method), .help = "how minimal boundaries impose the strain rate"},
     {KEY("penalty", REAL), .unit = "N m s", ONLY("kind", "compress shear deform"),

@@ -172,6 +172,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_neighbours_clear(&sim->neighbours);
   tal_implicit_clear(&sim->implicit);
   tal_rows_clear(&sim->rows);
+  tal_membrane_clear(&sim->membrane);
   free(sim->grain_records);
   free(sim->force_records);
   tal_graph_clear(&sim->graph);
@@ -233,6 +234,11 @@ static double plate_load(const tal_sim *sim, int side) {
   return plate ? -side * plate->fy : (double)NAN;
 }
 
+static double plate_shear(const tal_sim *sim, int side) {
+  const tal_wall *plate = tal_walls_plate(&sim->walls, side);
+  return plate ? plate->fx : (double)NAN;
+}
+
 static void row_minimal(const tal_sim *sim, tal_row *row) {
   const double none = (double)NAN, *multiplier = sim->rows.multiplier;
   const bool minimal = sim->boundary == &tal_boundary_minimal;
@@ -287,6 +293,11 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   row_minimal(sim, row);
   row->plate_bottom = plate_load(sim, +1);
   row->plate_top = plate_load(sim, -1);
+  row->plate_bottom_shear = plate_shear(sim, +1);
+  row->plate_top_shear = plate_shear(sim, -1);
+  row->membrane_tension = sim->membrane.count ? 0 : (double)NAN;
+  for (size_t b = 0; b < sim->membrane.count; b++)
+    row->membrane_tension = fmax(row->membrane_tension, sim->membrane.tension[b]);
   tal_energy_row(sim, row);
   row->dt_ratio = tal_step_longest(sim) / tal_critical_step(sim);
   double rate = plan && fabs(plan->rate) > 0 ? fabs(plan->rate) : first_rate(sim->scene);

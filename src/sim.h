@@ -7,6 +7,7 @@
 #include "continuum.h"
 #include "grains.h"
 #include "implicit.h"
+#include "membrane.h"
 #include "neighbours.h"
 #include "pack.h"
 #include "records.h"
@@ -40,6 +41,15 @@
   X(double, correcting_power, "W", "power of the forces that correct the mean velocity gradient")                      \
   X(double, correcting_work, "J", "work of the forces that correct the mean velocity gradient")                        \
   X(int64_t, unsolvable, "1", "1 when the mean velocity gradient could not be imposed")                                \
+  X(double, membrane_pressure_power, "W", "of the pressure on the membrane's links")                                   \
+  X(double, membrane_pressure_work, "J", "of the pressure on the membrane's links")                                    \
+  X(double, membrane_ends_power, "W", "of the plates on the membrane's ends")                                          \
+  X(double, membrane_ends_work, "J", "of the plates on the membrane's ends")                                           \
+  X(double, membrane_grains_power, "W", "of the membrane on the grains")                                               \
+  X(double, membrane_grains_work, "J", "of the membrane on the grains")                                                \
+  X(double, membrane_lost_power, "W", "lost in the membrane and its contacts to viscosity")                            \
+  X(double, membrane_lost_work, "J", "lost in the membrane and its contacts to viscosity")                             \
+  X(double, membrane_brought, "J", "energy of membranes laid, less that of membranes taken away")                      \
   X(double, refresh_shear, "1", "shear strain at the last refresh")                                                    \
   X(double, pressure, "Pa", "pressure applied now on the loop")                                                        \
   X(double, impulse_time, "s", "start of the window over which mean forces are taken")                                 \
@@ -94,6 +104,9 @@ typedef struct tal_run {
   X(strain_rate_error_xy, "1/s", "the same, symmetric part")                                                           \
   X(boundary_rank, "", "stress fields beyond the uniform ones that hold the shape (minimal, order > 0)")               \
   X(outside, "", "grains outside the loop")                                                                            \
+  X(plate_bottom_shear, "N", "horizontal force of the grains on the bottom plate")                                     \
+  X(plate_top_shear, "N", "horizontal force of the grains on the top plate")                                           \
+  X(membrane_tension, "N", "largest tension in a link of the membrane")                                                \
   X(plate_bottom, "N", "force of the grains on the bottom plate, compression positive")                                \
   X(plate_top, "N", "force of the grains on the top plate, compression positive")                                      \
   X(kinetic, "J", "kinetic energy")                                                                                    \
@@ -102,6 +115,7 @@ typedef struct tal_run {
   X(work_walls, "J", "work done by plates and walls")                                                                  \
   X(work_pressure, "J", "work done by the pressure on the loop")                                                       \
   X(work_minimal, "J", "work done by the forces that impose the strain rate (minimal)")                                \
+  X(work_membrane, "J", "energy that membranes brought when laid, less what they took along")                          \
   X(work_held, "J", "work done by what holds fixed grains and held spins")                                             \
   X(dissipated_friction, "J", "energy lost to friction")                                                               \
   X(dissipated_damping, "J", "energy lost to the viscous normal force")                                                \
@@ -152,6 +166,7 @@ struct tal_sim {
   tal_neighbours neighbours;
   tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;
+  tal_membrane membrane;
   tal_rows rows; // of a minimal boundary
   tal_run run;
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done

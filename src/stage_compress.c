@@ -8,7 +8,7 @@
 #include "plates.h"
 
 static bool without_plates(const tal_sim *sim) {
-  return sim->boundary->constrain != NULL;
+  return !sim->boundary->plates;
 }
 
 // The plates come with the height that the strain so far has left.
@@ -30,11 +30,9 @@ static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *er
   if (sim->run.axial_strain + plan->strain >= 1)
     return tal_fail(err, TAL_BAD_INPUT, "stages[%d].strain = %g would leave no height after an axial strain of %g",
                     (int)sim->run.stage, plan->strain, sim->run.axial_strain);
-  if (without_plates(sim))
-    tal_minimal_begin(sim, plan);
-  else
+  if (!without_plates(sim))
     begin_plates(sim);
-  return TAL_OK;
+  return sim->boundary->begin ? sim->boundary->begin(sim, plan, err) : TAL_OK;
 }
 
 static void before_step(tal_sim *sim, const tal_scene_stage *plan) {

@@ -5,12 +5,6 @@
 
 #include "boundary_minimal.h"
 
-static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
-  (void)err;
-  tal_minimal_begin(sim, plan);
-  return TAL_OK;
-}
-
 static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   (void)plan;
   tal_minimal_before_step(sim);
@@ -49,7 +43,7 @@ const tal_stage tal_stage_deform = {.name = "deform",
                                     .help = "any mix of imposed strain rates and stresses, minimal boundaries",
                                     .uses_graph = true,
                                     .steps = steps,
-                                    .begin = begin,
+                                    .begin = tal_minimal_begin,
                                     .before_step = before_step,
                                     .after_step = after_step,
                                     .target = target};

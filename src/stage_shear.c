@@ -3,12 +3,6 @@
 
 #include "boundary_minimal.h"
 
-static tal_status begin(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
-  (void)err;
-  tal_minimal_begin(sim, plan);
-  return TAL_OK;
-}
-
 static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   (void)plan;
   tal_minimal_before_step(sim);
@@ -35,7 +29,7 @@ const tal_stage tal_stage_shear = {.name = "shear",
                                    .help = "simple shear under minimal boundaries, pressure on xx and yy",
                                    .uses_graph = true,
                                    .steps = steps,
-                                   .begin = begin,
+                                   .begin = tal_minimal_begin,
                                    .before_step = before_step,
                                    .after_step = after_step,
                                    .target = target};

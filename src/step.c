@@ -148,6 +148,8 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   tal_status status = sim->stage->begin(sim, plan, err);
   if (status)
     return status;
+  if (sim->membrane.count && sim->boundary != &tal_boundary_membrane)
+    tal_membrane_remove(sim);
   set_friction(sim, plan);
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);
@@ -155,9 +157,11 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err)))
     return status;
   tal_sim_observe(sim);
-  if (sim->boundary && sim->boundary->constrain) {
+  if (sim->boundary && sim->boundary->start) {
     sim->boundary->start(sim);
     tal_sim_observe(sim);
+  }
+  if (sim->boundary && sim->boundary->constrain) {
     sim->boundary->constrain(sim, 0, 0.5 * sim->dt);
     tal_sim_driving(sim);
   }

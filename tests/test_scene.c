@@ -477,7 +477,7 @@ static void test_keys(void **state) {
   (void)state;
   static const struct {
     const char *what, *has, *has_not;
-  } rows[] = {{"", "material.young", "restitution_speed"},
+  } rows[] = {{"", "material.young", "viscosity"},
               {"stages.compress", "stages.rate", "stages.duration"},
               {"stages.free", "stages.duration", "stages.rate"},
               {"stages[1].rate", "only with kind: compress", "stages.strain"},
