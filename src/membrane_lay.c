@@ -203,14 +203,14 @@ tal_status tal_membrane_check(const tal_sim *sim, tal_error *err) {
   for (size_t i = 0; i < g->count; i++)
     smallest = fmin(smallest, g->r[i]);
   size_t torn = torn_link(m, smallest), crossed = crossed_link(m);
+  if (crossed < m->count)
+    return tal_fail(err, TAL_INVALID, "the membrane crosses itself at (%g, %g) m, t = %g s", m->x[crossed],
+                    m->y[crossed], sim->run.time);
   if (torn < m->count)
     return tal_fail(
         err, TAL_INVALID,
         "the membrane is torn at (%g, %g) m, t = %g s: a grain of radius %g m fits between two beads; a stiffer "
         "membrane (membrane.stiffness), larger beads or less pressure",
         m->x[torn], m->y[torn], sim->run.time, smallest);
-  if (crossed < m->count)
-    return tal_fail(err, TAL_INVALID, "the membrane crosses itself at (%g, %g) m, t = %g s", m->x[crossed],
-                    m->y[crossed], sim->run.time);
   return check_grains(sim, err);
 }

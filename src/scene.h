@@ -126,6 +126,7 @@ typedef struct tal_scene_stage {
   double pressure;                 // [Pa] all but free (NAN: inherited from confine; resolved by the loader)
   double ramp;                     // [s] confine
   double friction;                 // [-] confine; NAN: the material's
+  double plate_friction;           // [-] confine, compress: of the plates; NAN: that of the grains in this stage
   double tolerance;                // [-] confine: on the stresses, default 0.01
   double unbalanced;               // [-] confine: mean unbalanced over mean contact force, default 1e-3
   double timeout;                  // [s] confine: fails after this long, default 20 ramp + 20 s

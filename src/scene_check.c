@@ -329,6 +329,8 @@ static void check_method(const stage_place *at, const tal_scene_stage *stage) {
   if (stage->boundary && !named(stage->boundary, "membrane") && tal_node_get(at->node, "membrane"))
     wrong_stage(at, "membrane", "has no effect with boundary: %s; accepted: only with boundary: membrane",
                 stage->boundary);
+  if (minimal && tal_node_get(at->node, "plate_friction"))
+    wrong_stage(at, "plate_friction", "has no effect with boundary: minimal; accepted: only with plates");
   if (!minimal || !stage->method)
     return;
   if (exact && tal_node_get(at->node, "penalty"))

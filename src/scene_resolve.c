@@ -21,7 +21,7 @@ bool tal_scene_any_friction(const tal_scene *scene) {
   for (size_t w = 0; w < scene->wall_count; w++)
     any = any || scene->walls[w].friction > 0;
   for (size_t s = 0; s < scene->stage_count; s++)
-    any = any || scene->stages[s].friction > 0;
+    any = any || scene->stages[s].friction > 0 || scene->stages[s].plate_friction > 0;
   return any;
 }
 

@@ -85,7 +85,7 @@ static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
   sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
   for (size_t w = 0; w < sim->walls.count; w++)
     if (sim->walls.wall[w].plate != 0)
-      sim->walls.wall[w].friction = sim->friction;
+      sim->walls.wall[w].friction = isnan(plan->plate_friction) ? sim->friction : plan->plate_friction;
 }
 
 // The same in small steps.
