@@ -256,6 +256,7 @@ static void couple(tal_sim *sim, double kick, bool first) {
   if (first) {
     tal_boundary_target t = target_of(sim);
     sim->run.unsolvable = !tal_rows_set_up(rows, t.held, t.gradient, rows->mobility, &rows->equations);
+    rows->equations.kick = kick;
   }
   if (sim->run.unsolvable)
     return;
@@ -266,6 +267,19 @@ static void couple(tal_sim *sim, double kick, bool first) {
   }
 }
 
+// (82) with the forces that are known now. Where the implicit scheme has been at it, only its remainder is left.
+static void solve(tal_sim *sim, const tal_boundary_target *t, double kick) {
+  tal_rows *rows = &sim->rows;
+  if (rows->equations.kick != kick || sim->run.unsolvable) {
+    kicked(sim, kick, rows->given, rows->velocity);
+    sim->run.unsolvable = !tal_rows_solve(rows, t->held, t->gradient, rows->mobility, rows->velocity);
+    return;
+  }
+  write_forces(sim, t->stress);
+  kicked(sim, kick, rows->force, rows->velocity);
+  tal_rows_correct(rows, &rows->equations, rows->mobility, rows->velocity);
+}
+
 static void constrain(tal_sim *sim, double close, double open) {
   tal_rows *rows = &sim->rows;
   tal_run *run = &sim->run;
@@ -273,8 +287,7 @@ static void constrain(tal_sim *sim, double close, double open) {
   const double kick = close + open;
   collect_others(sim);
   if (exact(sim)) {
-    kicked(sim, kick, rows->given, rows->velocity);
-    run->unsolvable = !tal_rows_solve(rows, t.held, t.gradient, rows->mobility, rows->velocity);
+    solve(sim, &t, kick);
     write_forces(sim, t.stress);
   }
   kicked(sim, kick, rows->force, rows->velocity);

@@ -50,6 +50,7 @@
   X(double, membrane_lost_power, "W", "lost in the membrane and its contacts to viscosity")                            \
   X(double, membrane_lost_work, "J", "lost in the membrane and its contacts to viscosity")                             \
   X(double, membrane_brought, "J", "energy of membranes laid, less that of membranes taken away")                      \
+  X(int64_t, outside_most, "1", "most grains outside the loop since the first boundary acted")                         \
   X(double, refresh_shear, "1", "shear strain at the last refresh")                                                    \
   X(double, pressure, "Pa", "pressure applied now on the loop")                                                        \
   X(double, impulse_time, "s", "start of the window over which mean forces are taken")                                 \

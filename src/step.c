@@ -193,8 +193,11 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   run->refresh_step = run->step;
   run->refresh_strain = run->axial_strain;
   run->refresh_shear = run->shear_strain;
-  if (sim->boundary)
-    sim->boundary->refreshed(sim);
+  if (!sim->boundary)
+    return TAL_OK;
+  const int64_t outside = (int64_t)sim->graph.loop.outside_count;
+  run->outside_most = outside > run->outside_most ? outside : run->outside_most;
+  sim->boundary->refreshed(sim);
   return TAL_OK;
 }
 
