@@ -31,7 +31,7 @@ tal_status tal_minimal_begin(tal_sim *sim, const tal_scene_stage *plan, tal_erro
   run->pressure = plan->pressure;
   run->penalty = plan->penalty;
   run->axial_start = run->axial_strain;
-  memset(sim->rows.multiplier, 0, sizeof sim->rows.multiplier);
+  tal_rows_clear(&sim->rows); // until the stage's graph is there
   if (!run->strain_begun) {
     run->strain_begun = 1;
     run->log_volume = 0;
@@ -172,6 +172,8 @@ static void apply(tal_sim *sim) {
     memset(g->by, 0, g->count * sizeof *g->by);
     sim->boundary_moved = false;
   }
+  if (!rows->nodes)
+    return;
   tal_rows_move(rows, &sim->graph.loop, g->x, g->y);
   if (!exact(sim))
     penalise(sim, &t);

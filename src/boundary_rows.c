@@ -88,7 +88,8 @@ void tal_rows_move(tal_rows *rows, const geo_loop *loop, const double *x, const 
   measure_normals(rows, loop, x, y);
   component_rows(rows);
   double *higher = rows->row + TAL_COMPONENTS * 2 * rows->nodes;
-  memcpy(higher, rows->shape, rows->rank * 2 * rows->nodes * sizeof *higher);
+  if (rows->rank)
+    memcpy(higher, rows->shape, rows->rank * 2 * rows->nodes * sizeof *higher);
   for (size_t j = 0; j < rows->rank; j++)
     take_mean_out(rows, loop, x, y, higher + j * 2 * rows->nodes);
 }
