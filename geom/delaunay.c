@@ -14,6 +14,7 @@
 #include "memory.h"
 #include "predicate.h"
 #include "regular.h"
+#include "rim.h"
 
 static const geo_delaunay_backend *const backends[] = {
 #ifdef TAL_HAVE_CGAL
@@ -127,17 +128,6 @@ static bool all_on_one_line(const geo_site *site, size_t n) {
   return true;
 }
 
-static geo_delaunay_result check_sites(const geo_site *site, size_t n, geo_delaunay_report *report) {
-  if (!weights_in_range(site, n, report))
-    return GEO_DELAUNAY_NOT_FINITE;
-  if (!all_distinct(site, n, report))
-    return GEO_DELAUNAY_DUPLICATE;
-  if (!all_on_one_line(site, n))
-    return GEO_DELAUNAY_OK;
-  snprintf(report->text, sizeof report->text, "all %zu points lie on one line", n);
-  return GEO_DELAUNAY_COLLINEAR;
-}
-
 static geo_delaunay_result build(const geo_delaunay_backend *backend, const geo_site *site, bool weighted, size_t n,
                                  geo_mesh *mesh, geo_delaunay_report *report) {
   double *column = geo_resize(NULL, 3 * n, sizeof *column);
@@ -152,18 +142,29 @@ static geo_delaunay_result build(const geo_delaunay_backend *backend, const geo_
       backend->build(column, column + n, weighted ? column + 2 * n : NULL, n, &candidate, report);
   if (result == GEO_DELAUNAY_OK) {
     report->hidden = geo_regular_repair(site, n, &candidate);
-    geo_mesh_set(mesh, n, (const int32_t(*)[3])candidate.corner, candidate.triangle_count);
+    geo_mesh_move(mesh, &candidate);
   }
   geo_mesh_clear(&candidate);
   free(column);
   return result;
 }
 
-geo_delaunay_result geo_delaunay(const geo_delaunay_backend *backend, const double *x, const double *y,
-                                 const double *weight, size_t n, geo_mesh *mesh, geo_delaunay_report *report) {
-  geo_delaunay_report unused;
-  if (!report)
-    report = &unused;
+// From the mesh as it stands, or with its rim mended.
+static bool update(const geo_site *site, size_t n, geo_mesh *mesh, size_t *hidden) {
+  if (geo_regular_update(site, n, mesh, hidden))
+    return true;
+  geo_mesh mended;
+  geo_mesh_init(&mended);
+  bool good = geo_rim_mend(site, n, mesh, &mended) && geo_regular_update(site, n, &mended, hidden);
+  if (good)
+    geo_mesh_move(mesh, &mended);
+  geo_mesh_clear(&mended);
+  return good;
+}
+
+// What can be said without triangulating; then *site holds the sites.
+static geo_delaunay_result prepare(const double *x, const double *y, const double *weight, size_t n, geo_site **site,
+                                   geo_delaunay_report *report) {
   *report = (geo_delaunay_report){.first = -1, .second = -1};
   if (n < 3) {
     snprintf(report->text, sizeof report->text, "%zu points: a triangulation needs at least three", n);
@@ -171,13 +172,51 @@ geo_delaunay_result geo_delaunay(const geo_delaunay_backend *backend, const doub
   }
   if (!all_finite(x, y, weight, n, report))
     return GEO_DELAUNAY_NOT_FINITE;
-  geo_site *site = sites_of(x, y, weight, n);
-  geo_delaunay_result result = check_sites(site, n, report);
-  if (result == GEO_DELAUNAY_DUPLICATE)
+  *site = sites_of(x, y, weight, n);
+  if (weights_in_range(*site, n, report))
+    return GEO_DELAUNAY_OK;
+  free(*site);
+  return GEO_DELAUNAY_NOT_FINITE;
+}
+
+static geo_delaunay_result build_checked(const geo_delaunay_backend *backend, const geo_site *site, const double *x,
+                                         const double *y, bool weighted, size_t n, geo_mesh *mesh,
+                                         geo_delaunay_report *report) {
+  if (!all_distinct(site, n, report)) {
     snprintf(report->text, sizeof report->text, "points %d and %d coincide at (%.9g, %.9g)", report->first,
              report->second, x[report->first], y[report->first]);
-  if (result == GEO_DELAUNAY_OK)
-    result = build(backend, site, weight != NULL, n, mesh, report);
+    return GEO_DELAUNAY_DUPLICATE;
+  }
+  if (all_on_one_line(site, n)) {
+    snprintf(report->text, sizeof report->text, "all %zu points lie on one line", n);
+    return GEO_DELAUNAY_COLLINEAR;
+  }
+  return build(backend, site, weighted, n, mesh, report);
+}
+
+geo_delaunay_result geo_delaunay(const geo_delaunay_backend *backend, const double *x, const double *y,
+                                 const double *weight, size_t n, geo_mesh *mesh, geo_delaunay_report *report) {
+  geo_delaunay_report unused;
+  geo_site *site;
+  report = report ? report : &unused;
+  geo_delaunay_result result = prepare(x, y, weight, n, &site, report);
+  if (result != GEO_DELAUNAY_OK)
+    return result;
+  result = build_checked(backend, site, x, y, weight != NULL, n, mesh, report);
+  free(site);
+  return result;
+}
+
+geo_delaunay_result geo_delaunay_update(const geo_delaunay_backend *backend, const double *x, const double *y,
+                                        const double *weight, size_t n, geo_mesh *mesh, geo_delaunay_report *report) {
+  geo_delaunay_report unused;
+  geo_site *site;
+  report = report ? report : &unused;
+  geo_delaunay_result result = prepare(x, y, weight, n, &site, report);
+  if (result != GEO_DELAUNAY_OK)
+    return result;
+  if (!update(site, n, mesh, &report->hidden))
+    result = build_checked(backend, site, x, y, weight != NULL, n, mesh, report);
   free(site);
   return result;
 }

@@ -41,4 +41,10 @@ const geo_delaunay_backend *geo_delaunay_backend_find(const char *name);
 geo_delaunay_result geo_delaunay(const geo_delaunay_backend *backend, const double *x, const double *y,
                                  const double *weight, size_t n, geo_mesh *mesh, geo_delaunay_report *report);
 
+// The same triangles, sooner where `mesh` holds the triangulation of these points before they moved a little: its rim
+// is mended, its edges are tested exactly and flipped; where that does not do, all is built anew. Where no triangle
+// changes the mesh keeps its revision.
+geo_delaunay_result geo_delaunay_update(const geo_delaunay_backend *backend, const double *x, const double *y,
+                                        const double *weight, size_t n, geo_mesh *mesh, geo_delaunay_report *report);
+
 #endif

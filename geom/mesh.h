@@ -24,9 +24,14 @@ typedef struct geo_edge {
 void geo_mesh_init(geo_mesh *mesh);
 void geo_mesh_clear(geo_mesh *mesh);
 // Replaces the triangles (rotated so that the smallest index comes first, sorted, orientation kept) and rebuilds the
-// adjacency in O(T log T). `corner` [count][3] must be counter-clockwise. The result does not depend on the order
-// given.
+// adjacency in O(T) where few edges meet at each point. `corner` [count][3] must be counter-clockwise. The result does
+// not depend on the order given.
 void geo_mesh_set(geo_mesh *mesh, size_t point_count, const int32_t (*corner)[3], size_t count);
+// The same for triangles whose neighbours are known: neighbour[t][k] as in geo_mesh, numbered like `corner`. O(T).
+void geo_mesh_set_joined(geo_mesh *mesh, size_t point_count, const int32_t (*corner)[3], const int32_t (*neighbour)[3],
+                         size_t count);
+// Gives the triangles of `from` to `mesh`; `from` is left empty.
+void geo_mesh_move(geo_mesh *mesh, geo_mesh *from);
 // Fills `edges` (capacity >= 3 T) in ascending (i, j) order and returns E.
 size_t geo_mesh_edges(const geo_mesh *mesh, geo_edge *edges);
 // Signed area of triangle t [length^2], positive counter-clockwise.

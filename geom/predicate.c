@@ -1,15 +1,6 @@
-// Filter and expansion arithmetic behind the two predicates.
+// Expansion arithmetic behind the two predicates.
 // An expansion is a sum of doubles, smallest first, no two overlapping, no zeros; its sign is that of the last one.
-// Needs round-to-nearest-even and no contraction of a*b + c.
 #include "predicate.h"
-
-#include <math.h>
-
-#define EPS 0x1p-53 // relative error of one rounded operation
-
-static int sign_of(double value) {
-  return (value > 0) - (value < 0);
-}
 
 // high + low = a + b exactly, high = fl(a + b).
 static inline double two_sum(double a, double b, double *low) {
@@ -129,20 +120,11 @@ static expansion cross_exact(const expansion *ax, const expansion *ay, const exp
   return short_sum(&left, &right);
 }
 
-static int orient_exact(geo_site a, geo_site b, geo_site c) {
+int geo_orient_exact(geo_site a, geo_site b, geo_site c) {
   expansion ax = difference(a.x, c.x), ay = difference(a.y, c.y);
   expansion bx = difference(b.x, c.x), by = difference(b.y, c.y);
   expansion det = cross_exact(&ax, &ay, &bx, &by);
-  return det.length ? sign_of(det.part[det.length - 1]) : 0;
-}
-
-// Bound: each product carries (1 + EPS)^3, their difference one more: 4 EPS (|l| + |r|) to first order.
-int geo_orient(geo_site a, geo_site b, geo_site c) {
-  double left = (a.x - c.x) * (b.y - c.y), right = (a.y - c.y) * (b.x - c.x);
-  double det = left - right;
-  if (fabs(det) > 5 * EPS * (fabs(left) + fabs(right)))
-    return sign_of(det);
-  return orient_exact(a, b, c);
+  return det.length ? geo_sign(det.part[det.length - 1]) : 0;
 }
 
 // A row of the determinant: the point relative to d, and its lifted height.
@@ -158,7 +140,7 @@ static exact_row exact_row_of(geo_site a, geo_site d) {
   return row;
 }
 
-static int conflict_exact(geo_site a, geo_site b, geo_site c, geo_site d) {
+int geo_conflict_exact(geo_site a, geo_site b, geo_site c, geo_site d) {
   exact_row row[3] = {exact_row_of(a, d), exact_row_of(b, d), exact_row_of(c, d)};
   double now[DETERMINANT_MAX], next[DETERMINANT_MAX], term[TERM_MAX];
   int length = 0;
@@ -170,22 +152,5 @@ static int conflict_exact(geo_site a, geo_site b, geo_site c, geo_site d) {
     for (int i = 0; i < length; i++)
       now[i] = next[i];
   }
-  return length ? sign_of(now[length - 1]) : 0;
-}
-
-// Bound: a lift carries at most (1 + EPS)^5, a minor (1 + EPS)^4, their product one and the sum of three two more:
-// 12 EPS times the sum of the terms' magnitudes to first order. 16 covers the higher orders and the rounding of the
-// magnitudes themselves.
-int geo_conflict(geo_site a, geo_site b, geo_site c, geo_site d) {
-  double ax = a.x - d.x, ay = a.y - d.y, aw = a.w - d.w;
-  double bx = b.x - d.x, by = b.y - d.y, bw = b.w - d.w;
-  double cx = c.x - d.x, cy = c.y - d.y, cw = c.w - d.w;
-  double bxcy = bx * cy, bycx = by * cx, cxay = cx * ay, cyax = cy * ax, axby = ax * by, aybx = ay * bx;
-  double aa = ax * ax + ay * ay, bb = bx * bx + by * by, cc = cx * cx + cy * cy;
-  double det = (aa - aw) * (bxcy - bycx) + (bb - bw) * (cxay - cyax) + (cc - cw) * (axby - aybx);
-  double magnitude = (aa + fabs(aw)) * (fabs(bxcy) + fabs(bycx)) + (bb + fabs(bw)) * (fabs(cxay) + fabs(cyax)) +
-                     (cc + fabs(cw)) * (fabs(axby) + fabs(aybx));
-  if (fabs(det) > 16 * EPS * magnitude)
-    return sign_of(det);
-  return conflict_exact(a, b, c, d);
+  return length ? geo_sign(now[length - 1]) : 0;
 }

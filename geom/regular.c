@@ -30,12 +30,20 @@ static geo_site site_of(const geo_working *w, int32_t t, int k) {
   return w->site[w->corner[t][k]];
 }
 
-static bool edge_in_conflict(const geo_working *w, int32_t t, int k) {
+// What flipping has met so far.
+typedef struct flips {
+  bool changed; // a flip was made
+  bool ties;    // an edge lay exactly on the circle, at the time
+} flips;
+
+static bool edge_in_conflict(const geo_working *w, int32_t t, int k, flips *met) {
   int32_t u = w->neighbour[t][k];
   if (geo_working_ghost(w, t) >= 0 || geo_working_ghost(w, u) >= 0)
     return false;
   geo_site d = site_of(w, u, geo_working_side(w, u, t));
-  return geo_conflict(site_of(w, t, 0), site_of(w, t, 1), site_of(w, t, 2), d) > 0;
+  int conflict = geo_conflict(site_of(w, t, 0), site_of(w, t, 1), site_of(w, t, 2), d);
+  met->ties |= conflict == 0;
+  return conflict > 0;
 }
 
 // Triangles t = (a, b, c) and u = (d, c, b) become t = (a, b, d) and u = (a, d, c). False if that would turn one over.
@@ -65,18 +73,21 @@ static bool flip(geo_working *w, int32_t t, int k, edge_stack *stack) {
 
 // Flips until every edge is locally regular: each flip lowers the lifted surface, so this ends. False if an edge in
 // conflict cannot be flipped (power only: a site that should be hidden is a vertex).
-static bool flip_all(geo_working *w) {
+static bool flip_all(geo_working *w, flips *met) {
   edge_stack stack = {0};
   bool good = true;
+  *met = (flips){0};
   for (size_t t = 0; t < w->count; t++)
     for (int k = 0; k < 3; k++)
-      if (w->neighbour[t][k] > (int32_t)t && edge_in_conflict(w, (int32_t)t, k))
+      if (w->neighbour[t][k] > (int32_t)t && edge_in_conflict(w, (int32_t)t, k, met))
         push_edge(&stack, (int32_t)t, k);
   while (stack.count && good) {
     const int32_t *edge = stack.edge[--stack.count];
     int32_t t = edge[0], k = edge[1];
-    if (edge_in_conflict(w, t, k))
-      good = flip(w, t, k, &stack);
+    if (!edge_in_conflict(w, t, k, met))
+      continue;
+    met->changed = true;
+    good = flip(w, t, k, &stack);
   }
   free(stack.edge);
   return good;
@@ -288,8 +299,9 @@ static size_t count_hidden(const geo_mesh *mesh) {
 
 size_t geo_regular_repair(const geo_site *site, size_t n, geo_mesh *mesh) {
   inserter in = {0};
+  flips met;
   bool kept = geo_working_load(&in.w, site, n, mesh);
-  if (kept && !flip_all(&in.w)) {
+  if (kept && !flip_all(&in.w, &met)) {
     geo_working_clear(&in.w);
     kept = false;
   }
@@ -305,4 +317,21 @@ size_t geo_regular_repair(const geo_site *site, size_t n, geo_mesh *mesh) {
   free(in.border);
   geo_tie_break(site, mesh);
   return count_hidden(mesh);
+}
+
+bool geo_regular_update(const geo_site *site, size_t n, geo_mesh *mesh, size_t *hidden) {
+  geo_working w;
+  flips met;
+  if (mesh->point_count != n || !geo_working_load(&w, site, n, mesh))
+    return false;
+  bool good = count_hidden(mesh) == 0 && flip_all(&w, &met);
+  if (good && met.changed)
+    geo_working_store(&w, mesh);
+  geo_working_clear(&w);
+  *hidden = 0;
+  if (good && met.ties) {
+    geo_tie_break(site, mesh);
+    *hidden = count_hidden(mesh);
+  }
+  return good;
 }

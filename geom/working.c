@@ -137,10 +137,20 @@ void geo_working_start(geo_working *w, const geo_site *site, size_t n) {
 
 void geo_working_store(const geo_working *w, geo_mesh *mesh) {
   int32_t(*corner)[3] = geo_resize(NULL, w->count, sizeof *corner);
-  size_t count = 0;
+  int32_t(*neighbour)[3] = geo_resize(NULL, w->count, sizeof *neighbour);
+  int32_t *number = geo_resize(NULL, w->count, sizeof *number), count = 0;
   for (size_t t = 0; t < w->count; t++)
-    if (w->corner[t][0] >= 0 && geo_working_ghost(w, (int32_t)t) < 0)
-      memcpy(corner[count++], w->corner[t], sizeof *corner);
-  geo_mesh_set(mesh, (size_t)w->ghost, (const int32_t(*)[3])corner, count);
+    number[t] = w->corner[t][0] >= 0 && geo_working_ghost(w, (int32_t)t) < 0 ? count++ : -1;
+  for (size_t t = 0; t < w->count; t++) {
+    if (number[t] < 0)
+      continue;
+    memcpy(corner[number[t]], w->corner[t], sizeof *corner);
+    for (int k = 0; k < 3; k++)
+      neighbour[number[t]][k] = number[w->neighbour[t][k]];
+  }
+  geo_mesh_set_joined(mesh, (size_t)w->ghost, (const int32_t(*)[3])corner, (const int32_t(*)[3])neighbour,
+                      (size_t)count);
+  free(number);
+  free(neighbour);
   free(corner);
 }

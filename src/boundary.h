@@ -24,7 +24,8 @@ struct tal_boundary {
   // Beside constrain: corrects sim->implicit's velocities at the end of the kick, so that friction and damping that are
   // solved for answer to what is imposed. `first` of a solve.
   void (*couple)(tal_sim *sim, double kick, bool first);
-  void (*restored)(tal_sim *sim); // a checkpoint was read; NULL: nothing to put back
+  void (*coupled)(tal_sim *sim, double kick); // and when they are found: bx, by of the step
+  void (*restored)(tal_sim *sim);             // a checkpoint was read; NULL: nothing to put back
   // Adds to the grains' tangent stiffness and damping sum[grains][2], returns the critical step [s] of its own
   // contacts; NULL: it has none.
   double (*critical)(const tal_sim *sim, double (*sum)[2]);

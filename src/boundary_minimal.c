@@ -246,7 +246,7 @@ static double correcting_power(tal_sim *sim, double close) {
 
 static void couple(tal_sim *sim, double kick, bool first) {
   tal_rows *rows = &sim->rows;
-  tal_implicit_body *body = sim->implicit.body;
+  tal_implicit_body *body = sim->implicit.lane.body;
   const int32_t *node = sim->graph.loop.node;
   if (!exact(sim))
     return;
@@ -258,7 +258,6 @@ static void couple(tal_sim *sim, double kick, bool first) {
   if (first) {
     tal_boundary_target t = target_of(sim);
     sim->run.unsolvable = !tal_rows_set_up(rows, t.held, t.gradient, rows->mobility, &rows->equations);
-    rows->equations.kick = kick;
   }
   if (sim->run.unsolvable)
     return;
@@ -269,37 +268,47 @@ static void couple(tal_sim *sim, double kick, bool first) {
   }
 }
 
-// (82) with the forces that are known now. Where the implicit scheme has been at it, only its remainder is left.
-static void solve(tal_sim *sim, const tal_boundary_target *t, double kick) {
-  tal_rows *rows = &sim->rows;
-  if (rows->equations.kick != kick || sim->run.unsolvable) {
-    kicked(sim, kick, rows->given, rows->velocity);
-    sim->run.unsolvable = !tal_rows_solve(rows, t->held, t->gradient, rows->mobility, rows->velocity);
-    return;
-  }
-  write_forces(sim, t->stress);
-  kicked(sim, kick, rows->force, rows->velocity);
-  tal_rows_correct(rows, &rows->equations, rows->mobility, rows->velocity);
-}
-
-static void constrain(tal_sim *sim, double close, double open) {
-  tal_rows *rows = &sim->rows;
-  tal_run *run = &sim->run;
-  tal_boundary_target t = target_of(sim);
-  const double kick = close + open;
-  collect_others(sim);
-  if (exact(sim)) {
-    solve(sim, &t, kick);
-    write_forces(sim, t.stress);
-  }
-  kicked(sim, kick, rows->force, rows->velocity);
-  geo_tensor coming = tal_rows_gradient(rows, rows->velocity);
+static void note_gradient(tal_run *run, geo_tensor coming) {
   run->gradient_xx = coming.xx;
   run->gradient_xy = coming.xy;
   run->gradient_yx = coming.yx;
   run->gradient_yy = coming.yy;
-  run->correcting_power = correcting_power(sim, close);
 }
+
+// The bodies of the solve hold the velocities at both ends of the kick; the instant is in its middle.
+static void coupled(tal_sim *sim, double kick) {
+  tal_rows *rows = &sim->rows;
+  const tal_implicit_body *body = sim->implicit.lane.body;
+  const int32_t *node = sim->graph.loop.node;
+  double power = 0;
+  couple(sim, kick, false); // takes away the round-off
+  write_forces(sim, target_of(sim).stress);
+  for (size_t k = 0; k < rows->nodes; k++)
+    for (size_t axis = 0; axis < 2; axis++) {
+      const double now = body[node[k]].now[axis], before = body[node[k]].before[axis];
+      rows->velocity[2 * k + axis] = now;
+      power += (rows->force[2 * k + axis] - rows->given[2 * k + axis]) * 0.5 * (before + now);
+    }
+  note_gradient(&sim->run, tal_rows_gradient(rows, rows->velocity));
+  sim->run.correcting_power = power;
+}
+
+static void constrain(tal_sim *sim, double close, double open) {
+  tal_rows *rows = &sim->rows;
+  tal_boundary_target t = target_of(sim);
+  const double kick = close + open;
+  collect_others(sim);
+  if (exact(sim)) {
+    kicked(sim, kick, rows->given, rows->velocity);
+    sim->run.unsolvable = !tal_rows_solve(rows, t.held, t.gradient, rows->mobility, rows->velocity);
+    write_forces(sim, t.stress);
+  }
+  kicked(sim, kick, rows->force, rows->velocity);
+  note_gradient(&sim->run, tal_rows_gradient(rows, rows->velocity));
+  sim->run.correcting_power = correcting_power(sim, close);
+}
+
+// ---- checks ----
 
 static tal_status check_penalty(const tal_sim *sim, tal_error *err) {
   double limit = penalty_limit(sim);
@@ -336,5 +345,6 @@ const tal_boundary tal_boundary_minimal = {
     .start = start,
     .constrain = constrain,
     .couple = couple,
+    .coupled = coupled,
     .restored = restored,
     .check = check};

@@ -84,7 +84,6 @@ static void take_mean_out(const tal_rows *rows, const geo_loop *loop, const doub
 }
 
 void tal_rows_move(tal_rows *rows, const geo_loop *loop, const double *x, const double *y) {
-  rows->equations.kick = 0;
   measure_normals(rows, loop, x, y);
   component_rows(rows);
   double *higher = rows->row + TAL_COMPONENTS * 2 * rows->nodes;

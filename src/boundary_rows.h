@@ -21,7 +21,6 @@ enum { TAL_ORDER_MOST = 8, TAL_ROWS_MOST = TAL_COMPONENTS + 60 };
 // The equations (82) of the rows in force, scaled to a unit diagonal and decomposed.
 typedef struct tal_row_equations {
   size_t count;
-  double kick; // [s] for which they were set up by their owner, 0: not for the rows as they are
   size_t row[TAL_ROWS_MOST];
   double scale[TAL_ROWS_MOST], aim[TAL_ROWS_MOST];
   double matrix[TAL_ROWS_MOST * TAL_ROWS_MOST], tau[TAL_ROWS_MOST];

@@ -139,9 +139,10 @@ static void put_multipliers(tal_store *store, const tal_rows *rows) {
   tal_store_put(store, TAL_ARRAY("multiplier", "Pa", (double *)rows->multiplier, TAL_ROWS_MOST));
 }
 
-tal_status tal_checkpoint_write(const char *path, const char *previous, const tal_sim *sim, const char *scene_text,
+tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim *sim, const char *scene_text,
                                 const tal_run_files *files, tal_error *err) {
   tal_store store;
+  tal_implicit_save(sim);
   tal_store_begin(&store);
   put_head(&store, sim, scene_text, files);
   put_frames(&store, files);

@@ -39,8 +39,9 @@ typedef struct tal_run_files {
 void tal_run_files_clear(tal_run_files *files);
 void tal_run_files_add_frame(tal_run_files *files, tal_frame_mark frame);
 
-// Replaces `path`; the one before is kept as `previous`. scene_text: the scene as resolved. TAL_IO.
-tal_status tal_checkpoint_write(const char *path, const char *previous, const tal_sim *sim, const char *scene_text,
+// Replaces `path`; the one before is kept as `previous`. Brings the slots' histories up to date first. scene_text: the
+// scene as resolved. TAL_IO.
+tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim *sim, const char *scene_text,
                                 const tal_run_files *files, tal_error *err);
 
 // What a checkpoint says about itself.

@@ -6,6 +6,7 @@
 #include "damping.h"
 #include "effects.h"
 #include "integrate.h"
+#include "run.h"
 #include "sim.h"
 
 #include <math.h>
@@ -215,6 +216,7 @@ static void print_cost(tal_sim *sim) {
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
   if (steps == 0)
     return;
+  tal_run_threads(sim->grains.count, 0);
   double rate = measured_rate(sim);
   printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps, 1e-6 * rate * grains,
          steps / rate);

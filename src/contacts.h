@@ -10,6 +10,7 @@
 #define TAL_CONTACT_FIELDS(X)                                                                                          \
   X(int32_t, i, "1", STATE, "grain, i < j")                                                                            \
   X(int32_t, j, "1", STATE, "grain, or index of the wall in a list of wall contacts")                                  \
+  X(double, reach, "m", WORK, "sum of the radii; wall: the radius")                                                    \
   X(double, stiffness, "N/m^1.5 | N/m", WORK, "K of the normal law")                                                   \
   X(double, damping, "N s/m^1.5 | N s/m", WORK, "coefficient of the viscous part of the normal law")                   \
   X(double, friction, "1", WORK, "coefficient of friction")                                                            \

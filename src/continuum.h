@@ -27,6 +27,7 @@ typedef struct tal_graph {
   size_t grain_count;  // n
   bool valid;          // false before the first refresh and after a failed one
   // Derived from mesh, loop and inside by refresh and restore.
+  uint64_t indexed;        // revision of the mesh that the index belongs to
   size_t cell_count;       // C
   int32_t *cell;           // owned; [C] triangle of each cell
   unsigned char *place;    // owned; [n] a tal_place

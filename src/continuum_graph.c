@@ -86,17 +86,20 @@ static void index_cells(tal_graph *graph) {
   number_cells(graph, number);
   place_grains(graph);
   index_edges(graph, number);
+  graph->indexed = graph->mesh.revision;
   free(number);
 }
 
 static void keep_reference(tal_graph *graph, size_t n, const double *x, const double *y) {
-  free(graph->x);
-  free(graph->y);
-  graph->x = tal_alloc(n, sizeof *graph->x);
-  graph->y = tal_alloc(n, sizeof *graph->y);
+  if (graph->grain_count != n || !graph->x) {
+    free(graph->x);
+    free(graph->y);
+    graph->x = tal_alloc(n, sizeof *graph->x);
+    graph->y = tal_alloc(n, sizeof *graph->y);
+    graph->grain_count = n;
+  }
   memcpy(graph->x, x, n * sizeof *x);
   memcpy(graph->y, y, n * sizeof *y);
-  graph->grain_count = n;
 }
 
 static geo_delaunay_result triangulate(tal_graph *graph, const tal_grains *grains, geo_delaunay_report *report) {
@@ -104,25 +107,37 @@ static geo_delaunay_result triangulate(tal_graph *graph, const tal_grains *grain
   double *weight = graph->power ? tal_alloc(n, sizeof *weight) : NULL;
   for (size_t i = 0; weight && i < n; i++)
     weight[i] = grains->r[i] * grains->r[i];
-  geo_delaunay_result result = geo_delaunay(graph->backend, grains->x, grains->y, weight, n, &graph->mesh, report);
+  geo_delaunay_result result =
+      geo_delaunay_update(graph->backend, grains->x, grains->y, weight, n, &graph->mesh, report);
   free(weight);
   return result;
 }
 
+// Peels; *as_before: cells and loop are those that the index belongs to. False when nothing is left.
+static bool peel(tal_graph *graph, const tal_grains *g, bool *as_before) {
+  size_t count = graph->mesh.triangle_count;
+  unsigned char *before = graph->inside;
+  graph->inside = tal_alloc(count, sizeof *graph->inside);
+  bool left =
+      geo_loop_peel(&graph->loop, &graph->mesh, g->x, g->y, g->r, graph->side, graph->gap_limit, graph->inside) == 0;
+  *as_before = graph->cell && graph->indexed == graph->mesh.revision && memcmp(before, graph->inside, count) == 0;
+  free(before);
+  return left;
+}
+
 tal_status tal_graph_refresh(tal_graph *graph, const tal_grains *grains, tal_error *err) {
   geo_delaunay_report report = {.first = -1, .second = -1};
+  bool as_before;
   graph->valid = false;
   if (triangulate(graph, grains, &report) != GEO_DELAUNAY_OK)
     return tal_fail(err, TAL_INVALID, "no Delaunay graph of the %zu grains: %s", grains->count, report.text);
-  free(graph->inside);
-  graph->inside = tal_alloc(graph->mesh.triangle_count, sizeof *graph->inside);
-  if (geo_loop_peel(&graph->loop, &graph->mesh, grains->x, grains->y, grains->r, graph->side, graph->gap_limit,
-                    graph->inside) != 0)
+  if (!peel(graph, grains, &as_before))
     return tal_fail(err, TAL_INVALID,
                     "no assembly is left of the %zu grains: gaps wider than %g m let every cell be peeled off",
                     grains->count, graph->gap_limit);
   keep_reference(graph, grains->count, grains->x, grains->y);
-  index_cells(graph);
+  if (!as_before)
+    index_cells(graph);
   graph->valid = true;
   return TAL_OK;
 }

@@ -20,8 +20,6 @@ enum tal_effect {
 // What the contact law itself looks at.
 #define TAL_EFFECT_LAW                                                                                                 \
   (TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)
-// What it looks at for the forces along the normal alone.
-#define TAL_EFFECT_NORMAL (TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING)
 
 // A pure function that must vanish into the loop that calls it.
 #define TAL_KERNEL static inline __attribute__((always_inline))

@@ -95,7 +95,7 @@ static double last_half(const tal_sim *sim) {
 // Accounts of the grains with the last instant counted half.
 static power grain_works(const tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  power sum = {0};
+  power sum = {.friction = sim->run.friction_work, .damping = sim->run.damping_work};
   double half = last_half(sim);
   for (size_t i = 0; i < g->count; i++) {
     power p = grain_power(sim, i);

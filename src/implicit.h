@@ -39,26 +39,41 @@ struct tal_sim;
   X(fn, "N", "normal force found so far")                                                                              \
   X(ft, "N", "tangential force found so far, on i along t = (-ny, nx)")                                                \
   X(spring, "N", "spring law: force of the spring at this instant")                                                    \
-  X(spring_stiffness, "N/m", "spring law: at this instant")
+  X(spring_stiffness, "N/m", "spring law: at this instant")                                                            \
+  X(kept_spring, "N", "slot's `spring`, after the last step")                                                          \
+  X(kept_stiffness, "N/m", "slot's `spring_stiffness`, after the last step")                                           \
+  X(kept_viscous, "N", "slot's `viscous`, after the last step")
 
 // A grain, or what a wall slot meets: place and velocities (v, v, spin, spin), at the end of the kick with the forces
 // found so far and at its start.
 typedef struct tal_implicit_body {
-  tal_v4 place; // x, y [m]
-  tal_v4 now, before;
+  tal_lanes place; // x, y [m]
+  tal_lanes now, before;
 } tal_implicit_body;
 
-typedef struct tal_implicit {
-  tal_implicit_body *body; // owned; [body_capacity] grains, wall slots, one that nobody moves
-  size_t body_capacity;
-  size_t lanes, capacity;
+// Where all that lies. Loops take a copy of this, so that what they store cannot be taken for one of these pointers.
+typedef struct tal_implicit_lanes {
+  tal_implicit_body *body;                   // owned; [body_capacity] grains, wall slots, two that nobody moves
   int32_t *i, *j;                            // owned; [capacity] bodies
   int32_t *slot;                             // owned; [capacity] in sim->pairs; ~ of it in sim->wall_contacts
   bool *filler;                              // owned; [capacity] lanes that only fill a vector
-  double *partial;                           // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] work of each block
 #define X(name, unit, meaning) double *name; // owned; [capacity]
   TAL_LANE_FIELDS(X)
 #undef X
+} tal_implicit_lanes;
+
+// Work of a block's contacts over a kick, on both sides together [J].
+typedef struct tal_implicit_works {
+  double friction, damping;
+} tal_implicit_works;
+
+typedef struct tal_implicit {
+  tal_implicit_lanes lane;
+  size_t lanes, capacity, body_capacity;
+  size_t *wall_lane; // owned; [wall_lanes] lanes of the wall slots
+  size_t wall_lanes;
+  tal_implicit_works *partial; // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] what each block returned
+  bool all_free;               // no grain is fixed and no spin held
   size_t colour_count;
   size_t first[66]; // first lane of each colour
   bool serial_last; // the last colour holds what found no free one, a vector each: swept in order by one thread
@@ -71,10 +86,16 @@ enum { TAL_IMPLICIT_VECTOR = 8 };
 
 void tal_implicit_init(tal_implicit *system);
 void tal_implicit_clear(tal_implicit *system);
-// Forces of all slots for a kick of `kick` seconds that starts from the grains' velocities as they stand, with the
-// boundary forces: into the force records and the wall slots. A step (`advances`) keeps the forces as the next step's
-// start and moves the springs; an observation does not.
-void tal_implicit_solve(struct tal_sim *sim, double kick, bool advances);
+// A step: forces of all slots for the kick of sim->dt that starts from the grains' velocities as they stand, with the
+// boundary forces; the second half of the kick; works over `credit` seconds [eq (16)]; histories move. The wall slots
+// hold their forces then, the force records where tal_implicit_answer is asked.
+void tal_implicit_step(struct tal_sim *sim, double credit);
+// An observation: forces for half a step from the velocities as they stand, into force records and wall slots.
+void tal_implicit_observe(struct tal_sim *sim);
+// Fills the force records from the last step.
+void tal_implicit_answer(struct tal_sim *sim);
+// Brings the slots' histories up to date, for a checkpoint or a new list.
+void tal_implicit_save(struct tal_sim *sim);
 
 // Lanes for the slots of the present neighbour list: colours, and what does not change until the next list.
 void tal_implicit_list(struct tal_sim *sim);

@@ -14,39 +14,40 @@ void tal_implicit_init(tal_implicit *system) {
   *system = (tal_implicit){0};
 }
 
-void tal_implicit_clear(tal_implicit *system) {
-  free(system->body);
-  free(system->i);
-  free(system->j);
-  free(system->slot);
-  free(system->filler);
+static void free_all(tal_implicit *system) {
+  tal_implicit_lanes *m = &system->lane;
+  free(m->body);
+  free(m->i);
+  free(m->j);
+  free(m->slot);
+  free(m->filler);
   free(system->partial);
-#define X(name, unit, meaning) free(system->name);
+  free(system->wall_lane);
+#define X(name, unit, meaning) free(m->name);
   TAL_LANE_FIELDS(X)
 #undef X
+}
+
+void tal_implicit_clear(tal_implicit *system) {
+  free_all(system);
   tal_implicit_init(system);
 }
 
 static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
-  if (bodies > s->body_capacity) {
-    free(s->body);
-    s->body_capacity = bodies + bodies / 16;
-    s->body = tal_alloc(s->body_capacity, sizeof *s->body);
-  }
-  if (lanes <= s->capacity)
+  if (bodies <= s->body_capacity && lanes <= s->capacity)
     return;
-  tal_implicit_body *body = s->body;
-  tal_implicit old = *s;
-  old.body = NULL;
-  tal_implicit_clear(&old);
-  s->body = body;
+  free_all(s);
+  s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
-  s->i = tal_alloc(s->capacity, sizeof *s->i);
-  s->j = tal_alloc(s->capacity, sizeof *s->j);
-  s->slot = tal_alloc(s->capacity, sizeof *s->slot);
-  s->filler = tal_alloc(s->capacity, sizeof *s->filler);
+  s->wall_lane = NULL;
   s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_BLOCK + COLOURS + 2, sizeof *s->partial);
-#define X(name, unit, meaning) s->name = tal_alloc(s->capacity, sizeof *s->name);
+  tal_implicit_lanes *m = &s->lane;
+  m->body = tal_alloc(s->body_capacity, sizeof *m->body);
+  m->i = tal_alloc(s->capacity, sizeof *m->i);
+  m->j = tal_alloc(s->capacity, sizeof *m->j);
+  m->slot = tal_alloc(s->capacity, sizeof *m->slot);
+  m->filler = tal_alloc(s->capacity, sizeof *m->filler);
+#define X(name, unit, meaning) m->name = tal_alloc(s->capacity, sizeof *m->name);
   TAL_LANE_FIELDS(X)
 #undef X
 }
@@ -93,7 +94,7 @@ static size_t lay_out(tal_implicit *s, const uint8_t *colour, size_t count) {
   return lanes;
 }
 
-static void fill_lane(const tal_sim *sim, tal_implicit *s, size_t lane, int32_t slot) {
+static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t lane, int32_t slot) {
   const tal_grains *g = &sim->grains;
   const bool wall = slot < 0;
   const tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
@@ -114,10 +115,13 @@ static void fill_lane(const tal_sim *sim, tal_implicit *s, size_t lane, int32_t 
   s->mass_j[lane] = wall ? 0 : g->inverse_mass[j];
   s->inertia_i[lane] = spin ? g->inverse_inertia[i] : 0;
   s->inertia_j[lane] = spin && !wall ? g->inverse_inertia[j] : 0;
+  s->kept_spring[lane] = slots->spring[c];
+  s->kept_stiffness[lane] = slots->spring_stiffness[c];
+  s->kept_viscous[lane] = slots->viscous[c];
 }
 
 // A lane between two bodies that nobody moves, without radius.
-static void fill_rest(tal_implicit *s, size_t lane, int32_t nobody) {
+static void fill_rest(const tal_implicit_lanes *s, size_t lane, int32_t nobody) {
   s->i[lane] = nobody;
   s->j[lane] = nobody + 1;
   s->slot[lane] = 0;
@@ -145,17 +149,43 @@ void tal_implicit_list(tal_sim *sim) {
   reserve(s, grains + walls + 2, lanes);
   memcpy(next, s->first, sizeof next);
   s->lanes = lanes;
-  s->body[nobody].place = (tal_v4){1, 0, 0, 0}; // a unit apart
-  s->body[nobody + 1].place = (tal_v4){0, 0, 0, 0};
+  free(s->wall_lane);
+  s->wall_lanes = walls;
+  s->wall_lane = tal_alloc(walls, sizeof *s->wall_lane);
+  s->lane.body[nobody].place = (tal_lanes){1, 0, 0, 0}; // a unit apart
+  s->lane.body[nobody + 1].place = (tal_lanes){0, 0, 0, 0};
   for (size_t k = 0; k < lanes; k++)
-    fill_rest(s, k, nobody);
+    fill_rest(&s->lane, k, nobody);
   for (size_t k = 0; k < count; k++) {
     size_t lane = next[colour[k]];
     next[colour[k]] += colour[k] == COLOURS ? TAL_IMPLICIT_VECTOR : 1;
-    fill_lane(sim, s, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
+    fill_lane(sim, &s->lane, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
+    if (k >= pairs)
+      s->wall_lane[k - pairs] = lane;
   }
   free(i);
   free(j);
   free(colour);
+  s->all_free = true;
+  for (size_t g = 0; g < grains; g++)
+    s->all_free = s->all_free && sim->grains.inverse_mass[g] > 0 &&
+                  (sim->grains.inverse_inertia[g] > 0 || !(sim->effects & TAL_EFFECT_SPIN));
   s->listed = sim->neighbours.rebuilds;
+}
+
+void tal_implicit_save(tal_sim *sim) {
+  const tal_implicit *s = &sim->implicit;
+  const tal_implicit_lanes *m = &s->lane;
+  if (s->listed != sim->neighbours.rebuilds)
+    return;
+  for (size_t lane = 0; lane < s->lanes; lane++) {
+    if (m->filler[lane])
+      continue;
+    const bool wall = m->slot[lane] < 0;
+    tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
+    const size_t c = (size_t)(wall ? ~m->slot[lane] : m->slot[lane]);
+    slots->spring[c] = m->kept_spring[lane];
+    slots->spring_stiffness[c] = m->kept_stiffness[lane];
+    slots->viscous[c] = m->kept_viscous[lane];
+  }
 }

@@ -20,8 +20,14 @@ const tal_integrator *tal_integrator_find(const char *name);
 // The part of a step before the forces, eqs (12)-(14): first half kick, drift of grains and walls, predicted velocities
 // into the grain records, neighbour list, boundary forces.
 void tal_integrate_drift(tal_sim *sim, double dt);
-// The part after the forces, eq (15): second half kick, ledger, loads of the walls.
-void tal_integrate_finish(tal_sim *sim);
+// Time [s] over which the forces of this instant act: half of this step and half of the next.
+static inline double tal_integrate_credit(const tal_sim *sim) {
+  return 0.5 * (sim->dt + sim->dt_next);
+}
+// Forces of the contacts and what the boundary imposes, second half kick, ledger, eq (15).
+void tal_integrate_forces(tal_sim *sim);
+// Second half of what moves beside the grains: bodies of the boundary, loads of the walls.
+void tal_integrate_end(tal_sim *sim);
 // One step of velocity Verlet.
 void tal_integrate_verlet_step(tal_sim *sim);
 // Small steps after which the pattern of steps repeats: what is written on a schedule is written there.

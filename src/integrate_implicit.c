@@ -8,16 +8,15 @@
 #include "integrate.h"
 
 #include "effects.h"
-#include "forces.h"
 #include "implicit.h"
 
 static void advance(tal_sim *sim) {
   tal_integrate_drift(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_implicit_solve(sim, sim->dt, true);
+    tal_implicit_step(sim, tal_integrate_credit(sim));
   else
-    tal_forces_sweep(sim, sim->dt);
-  tal_integrate_finish(sim);
+    tal_integrate_forces(sim);
+  tal_integrate_end(sim);
 }
 
 const tal_integrator tal_implicit_friction = {

@@ -44,7 +44,8 @@ TAL_KERNEL tal_law_force tal_contact_law(tal_meeting m, tal_law_constants k, uns
                                            : tal_linear_viscous(m.damping, m.approach);
     double sum = fe + fv;
     fn = sum > 0 ? sum : 0;
-    fn = m.overlap > 0 ? fn : 0;
+    if (!(effects & TAL_EFFECT_HERTZ)) // Hertz: apart, the root is zero
+      fn = m.overlap > 0 ? fn : 0;
   }
   tal_law_force f = {.fe = fe, .fd = fn - fe};
   if (effects & TAL_EFFECT_REGULARISED)

@@ -9,7 +9,7 @@
 // friction * normal [N], slip [m/s] with sign; returns the force on i along t [N].
 TAL_KERNEL double tal_regularised_force(double cap, double slip, double inverse_vR, double inverse_exponent) {
   double f = cap * tal_root(fabs(slip) * inverse_vR, inverse_exponent);
-  return slip > 0 ? -f : f;
+  return copysign(f, -slip);
 }
 
 #endif

@@ -123,7 +123,7 @@ static void add_contact(tal_sim *sim, tal_bead_contact *c) {
   const tal_grain_record *i = &sim->grain_records[c->grain];
   const size_t b = (size_t)c->bead;
   double dx = m->x[b] - i->x, dy = m->y[b] - i->y, distance = sqrt(dx * dx + dy * dy);
-  c->overlap = m->r[b] + i->r - distance;
+  c->overlap = m->r[b] + g->r[c->grain] - distance;
   c->fe = c->fd = 0;
   if (c->overlap <= 0)
     return;

@@ -123,7 +123,7 @@ bool tal_membrane_lay(tal_sim *sim, const tal_scene_membrane *plan) {
   place_chain(sim, plan, 0, links, -1);
   place_chain(sim, plan, links + 1, links, +1);
   for (size_t i = 0; i < g->count; i++) // the grains stand still
-    sim->grain_records[i] = (tal_grain_record){.x = g->x[i], .y = g->y[i], .r = g->r[i]};
+    sim->grain_records[i] = (tal_grain_record){.x = g->x[i], .y = g->y[i]};
   bool rests = settle(sim);
   memset(g->bx, 0, g->count * sizeof *g->bx); // of the laying
   memset(g->by, 0, g->count * sizeof *g->by);

@@ -2,12 +2,16 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
+#include "contact_block.h"
 #include "damping.h"
 #include "law.h"
 #include "sim.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+// Steps between two looks at the displacements, at most.
+enum { LOOK_EVERY = 64 };
 
 void tal_neighbours_init(tal_neighbours *neighbours) {
   *neighbours = (tal_neighbours){0};
@@ -37,6 +41,7 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   double modulus = sim->constants.modulus;
   slots->i[c] = i;
   slots->j[c] = j;
+  slots->reach[c] = g->r[i] + g->r[j];
   slots->stiffness[c] =
       sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
   slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
@@ -49,6 +54,7 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   const tal_wall *wall = &sim->walls.wall[w];
   slots->i[c] = i;
   slots->j[c] = w;
+  slots->reach[c] = g->r[i];
   slots->stiffness[c] = sim->effects & TAL_EFFECT_HERTZ
                             ? tal_hertz_stiffness(sim->constants.modulus, wall->modulus, g->r[i])
                             : sim->scene->contact.stiffness;
@@ -71,6 +77,22 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
   }
 }
 
+// A ring holds the sums of all grains from the first that is not yet complete to the last partner of a block.
+static void measure_ring(tal_sim *sim) {
+  const tal_contacts *slots = &sim->pairs;
+  const size_t block = TAL_BLOCK, waiting = TAL_BLOCK;
+  size_t span = 0, held = 0;
+  for (size_t c = 0; c < slots->count; c++) {
+    size_t j = (size_t)slots->j[c], first = (size_t)slots->i[c < block ? 0 : c - block + 1];
+    span = j - (size_t)slots->i[c] > span ? j - (size_t)slots->i[c] : span;
+    held = j - first > held ? j - first : held;
+  }
+  sim->neighbours.span = span;
+  sim->neighbours.ring = 1;
+  while (sim->neighbours.ring < held + waiting)
+    sim->neighbours.ring *= 2;
+}
+
 static void list_pairs(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   geo_pairs *pairs = &sim->neighbours.pairs;
@@ -85,8 +107,7 @@ static void list_pairs(tal_sim *sim) {
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
-  free(sim->force_records);
-  sim->force_records = tal_alloc(sim->pairs.capacity, sizeof *sim->force_records);
+  measure_ring(sim);
 }
 
 // Elastic energy [J] of a grain on a wall `back` seconds before the end of this step's drift.
@@ -181,6 +202,7 @@ static void list_all(tal_sim *sim) {
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
     n->grain_capacity = g->count;
   }
+  tal_implicit_save(sim);
   list_pairs(sim);
   list_walls(sim);
   list_incidences(sim);
@@ -196,6 +218,8 @@ void tal_neighbours_rebuild(tal_sim *sim) {
     sim->walls.wall[w].y_list = sim->walls.wall[w].y0;
   }
   list_all(sim);
+  sim->neighbours.moved = 0;
+  sim->neighbours.unseen = 0;
   for (size_t w = 0; w < sim->walls.count; w++)
     sim->walls.wall[w].listed = tal_wall_active(&sim->walls.wall[w], sim->run.time);
 }
@@ -203,6 +227,7 @@ void tal_neighbours_rebuild(tal_sim *sim) {
 void tal_neighbours_restore(tal_sim *sim) {
   sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
   list_all(sim);
+  sim->neighbours.moved = sim->constants.skin; // the next step has to look
 }
 
 // Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.
@@ -210,7 +235,7 @@ static double largest_displacement(const tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   double largest = 0;
   bool finite = true;
-#pragma omp parallel for simd schedule(static) reduction(max : largest) reduction(&& : finite) if (g->count > 2000)
+#pragma omp simd reduction(max : largest) reduction(&& : finite)
   for (size_t i = 0; i < g->count; i++) {
     double dx = g->x[i] - g->x_list[i], dy = g->y[i] - g->y_list[i];
     double d2 = dx * dx + dy * dy;
@@ -220,13 +245,34 @@ static double largest_displacement(const tal_sim *sim) {
   return finite ? largest : (double)NAN;
 }
 
-bool tal_neighbours_stale(const tal_sim *sim) {
-  double grains = sqrt(largest_displacement(sim)), other = grains;
+static double largest_wall_displacement(const tal_sim *sim) {
+  double largest = 0;
   for (size_t w = 0; w < sim->walls.count; w++) {
     const tal_wall *wall = &sim->walls.wall[w];
-    other = fmax(other, hypot(wall->x0 - wall->x_list, wall->y0 - wall->y_list));
-    if (tal_wall_active(wall, sim->run.time) != (wall->listed != 0))
-      return true;
+    largest = fmax(largest, hypot(wall->x0 - wall->x_list, wall->y0 - wall->y_list));
   }
-  return !(grains + other < sim->constants.skin);
+  return largest;
+}
+
+static bool walls_changed(const tal_sim *sim) {
+  for (size_t w = 0; w < sim->walls.count; w++)
+    if (tal_wall_active(&sim->walls.wall[w], sim->run.time) != (sim->walls.wall[w].listed != 0))
+      return true;
+  return false;
+}
+
+// Adding up the fastest grain's steps bounds the displacements; they are looked at when the bound no longer does, and
+// now and then, lest round-off in coordinates adds up. That a look is due follows from the motion alone.
+bool tal_neighbours_stale(tal_sim *sim, double step) {
+  tal_neighbours *n = &sim->neighbours;
+  const double walls = largest_wall_displacement(sim);
+  if (walls_changed(sim))
+    return true;
+  n->moved += step;
+  n->unseen++;
+  if (n->unseen < LOOK_EVERY && n->moved + fmax(n->moved, walls) < sim->constants.skin)
+    return false;
+  n->moved = sqrt(largest_displacement(sim));
+  n->unseen = 0;
+  return !(n->moved + fmax(n->moved, walls) < sim->constants.skin);
 }

@@ -13,6 +13,10 @@ typedef struct tal_neighbours {
   int32_t *slot;       // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
   int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
   size_t grain_capacity, slot_capacity;
+  size_t span;  // largest j - i of the slots
+  size_t ring;  // grains whose sums the hot loop must hold at a time, a power of two
+  double moved; // [m] no grain has moved further than this since the list was built
+  int unseen;   // steps since the displacements were looked at
   uint64_t rebuilds;
 } tal_neighbours;
 
@@ -23,8 +27,8 @@ void tal_neighbours_rebuild(struct tal_sim *sim);
 // Makes the list of a restored run again: that of the centres it was last built from, so that the order of the contacts
 // and the moment of the next rebuild are those of the unbroken run.
 void tal_neighbours_restore(struct tal_sim *sim);
-// True when two bodies not on the list may have met since it was built, a wall has come or gone, or a coordinate is no
-// number.
-bool tal_neighbours_stale(const struct tal_sim *sim);
+// After a step in which no grain has moved by more than `step` [m]: true when two bodies not on the list may have met
+// since it was built, a wall has come or gone, or a coordinate is no number.
+bool tal_neighbours_stale(struct tal_sim *sim, double step);
 
 #endif

@@ -208,7 +208,7 @@ const tal_stage_report *tal_output_stages_before(const tal_output *output) {
   return output->before;
 }
 
-tal_status tal_output_checkpoint(tal_output *output, const tal_sim *sim, tal_error *err) {
+tal_status tal_output_checkpoint(tal_output *output, tal_sim *sim, tal_error *err) {
   // What the checkpoint says of the CSV must be on disk before it is.
   tal_status status = tal_csv_sync(&output->series, err);
   if (status == TAL_OK)

@@ -58,7 +58,7 @@ tal_status tal_output_row(tal_output *output, const tal_row *row, tal_error *err
 tal_status tal_output_tracks(tal_output *output, const tal_sim *sim, tal_error *err);
 tal_status tal_output_fields(tal_output *output, tal_sim *sim, tal_error *err);
 // checkpoint.h5 (the one before becomes checkpoint.prev.h5).
-tal_status tal_output_checkpoint(tal_output *output, const tal_sim *sim, tal_error *err);
+tal_status tal_output_checkpoint(tal_output *output, tal_sim *sim, tal_error *err);
 tal_status tal_output_report(tal_output *output, const tal_sim *sim, const tal_run_report *report, tal_error *err);
 
 #endif

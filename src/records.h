@@ -1,18 +1,19 @@
-// What the hot loop reads and writes, packed to one cache line per grain and per contact: a contact fetches two lines
-// instead of a dozen, a grain sums one line per contact. Rebuilt every step, kept by nobody.
+// What the hot loop reads and writes, packed to one cache line per grain: a contact fetches two lines instead of a
+// dozen. The first half of a grain record is subtracted from its partner's; of the second half the first pair too, the
+// last pair is added. Grain records are written every step, kept by nobody.
 #ifndef TAL_RECORDS_H
 #define TAL_RECORDS_H
 
 // One grain as the contact laws see it.
 typedef struct tal_grain_record {
   double x, y;   // [m] centre
-  double r;      // [m] radius
   double ux, uy; // [m/s] velocity for damping and regularised friction: predicted for the instant of x, y
-  double spin;   // [rad/s] the same; for the spring law in the middle of the step
   double hx, hy; // [m/s] velocity in the middle of the step: it moves the tangential springs
+  double spin;   // [rad/s] as ux, uy; for the spring law in the middle of the step
+  double r_spin; // [m/s] radius times spin
 } __attribute__((aligned(64))) tal_grain_record;
 
-// Forces of one contact on its grain i; on j the vectors change sign.
+// Forces of one contact on its grain i (on j the vectors change sign), or sums of them over the contacts of a grain.
 typedef struct tal_force_record {
   double elastic_x, elastic_y;   // [N] elastic normal force
   double viscous_x, viscous_y;   // [N] the rest of the normal force

@@ -279,11 +279,12 @@ static tal_status run_opened(job *this, const tal_run_options *options, tal_run_
   return status;
 }
 
-// As many threads as asked for, else as there are; but a thousand grains wait longer for a second thread than it saves.
-static void set_threads(job *this, int asked) {
-  int useful = 1 + (int)(this->sim->grains.count / 2000), there = omp_get_num_procs();
-  this->cores = asked > 0 ? asked : useful < there ? useful : there;
-  omp_set_num_threads(this->cores);
+// A thousand grains wait longer for a second thread than it saves.
+int tal_run_threads(size_t grains, int asked) {
+  int useful = 1 + (int)(grains / 2000), there = omp_get_num_procs();
+  int threads = asked > 0 ? asked : useful < there ? useful : there;
+  omp_set_num_threads(threads);
+  return threads;
 }
 
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
@@ -294,7 +295,7 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
   if (status == TAL_OK)
     status = tal_output_check_tracks(scene, run.sim->grains.count, err);
   if (status == TAL_OK)
-    set_threads(&run, options->threads);
+    run.cores = tal_run_threads(run.sim->grains.count, options->threads);
   if (status == TAL_OK)
     status = open_output(&run, options, &result->already_done, err);
   if (status == TAL_OK && !result->already_done) {

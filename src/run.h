@@ -19,6 +19,8 @@ typedef struct tal_run_result {
   double grain_steps_per_second;
 } tal_run_result;
 
+// Sets and returns the number of threads for so many grains: as asked for, else (0) what is there and pays.
+int tal_run_threads(size_t grains, int asked);
 // Runs the scene into options->dir. Returns TAL_OK, TAL_BAD_INPUT, TAL_INVALID (the last good checkpoint stays),
 // TAL_IO, or TAL_INTERRUPTED after SIGINT, SIGTERM or SIGUSR1 (checkpoint written), with one sentence in err.
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,

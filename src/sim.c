@@ -175,6 +175,7 @@ void tal_sim_free(tal_sim *sim) {
   tal_membrane_clear(&sim->membrane);
   free(sim->grain_records);
   free(sim->force_records);
+  free(sim->sums);
   tal_graph_clear(&sim->graph);
   free(sim);
 }
@@ -196,7 +197,7 @@ tal_observed tal_sim_observe(tal_sim *sim) {
   if (sim->boundary && sim->graph.valid)
     sim->boundary->apply(sim);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_implicit_solve(sim, 0.5 * sim->dt, false);
+    tal_implicit_observe(sim);
   else
     tal_forces_sweep(sim, 0);
   return tal_sim_driving(sim);

@@ -60,6 +60,8 @@
   X(int64_t, arc_top_left, "1", "place on the loop where the left arc begins")                                         \
   X(double, rest, "1", "mean unbalanced force over mean contact force, averaged over the last window")                 \
   X(int64_t, stage_done, "1", "1 once the current stage has reached its end")                                          \
+  X(double, friction_work, "J", "work on grains by tangential forces that were solved implicitly")                     \
+  X(double, damping_work, "J", "work on grains by viscous forces that were solved implicitly")                         \
   X(double, kinetic0, "J", "kinetic energy at the start")                                                              \
   X(double, elastic0, "J", "elastic energy at the start")                                                              \
   X(double, gravity0, "J", "potential energy of gravity at the start")
@@ -163,7 +165,10 @@ struct tal_sim {
   tal_contacts wall_contacts; // grain-wall slots
   tal_walls walls;
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
-  tal_force_record *force_records; // owned; [pairs.capacity] what they answer
+  tal_force_record *force_records; // owned; [force_capacity] what they answer, per slot, where it is kept
+  tal_force_record *sums;          // owned; [sums_capacity] rings of the hot loop, zero between steps
+  size_t force_capacity, sums_capacity;
+  bool forces_kept; // the force records are those of the last step or sweep
   tal_neighbours neighbours;
   tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;

@@ -166,7 +166,7 @@ static void open_canvas(const picture *p, tal_plot *plot) {
   char text[120];
   snprintf(text, sizeof text, "|error| of %.80s%s", name, p->scale == 1 ? "" : " (% of the reference)");
   tal_plot_text(out, text, 70);
-  fprintf(out, " noenhanced font ',%d'\n", FONT - 2);
+  fprintf(out, " noenhanced font ',%d'\n", strlen(text) > 44 ? FONT - 6 : FONT - 2);
 }
 
 // A grey band from the foot of the axis up to `top`.

@@ -73,6 +73,8 @@ static void correlate(const tal_study_summary *s, size_t m) {
       if (study->runs[r].seed != study->runs[q].seed || !read_fluctuation(s, r, metric, &other))
         continue;
       *value_of(s, r, m) = tal_fluctuation_correlation(&reference, &other);
+      if (other.start != reference.start)
+        note(&s->results[r], metric, &(tal_error){"the run starts from another state than the reference's"});
       tal_fluctuation_clear(&other);
     }
     tal_fluctuation_clear(&reference);

@@ -9,7 +9,7 @@
 
 typedef struct tal_study_result {
   tal_study_state state;
-  char note[300]; // why a metric of a finished run is NAN; ""
+  char note[300]; // of a finished run: why a metric is NAN or to be doubted; ""
 } tal_study_result;
 
 typedef struct tal_study_cell {

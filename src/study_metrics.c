@@ -2,6 +2,7 @@
 #include "study_metrics.h"
 
 #include "figures_frames.h"
+#include "files.h"
 
 #include <gsl/gsl_multifit.h>
 #include <math.h>
@@ -181,6 +182,7 @@ static void fill(tal_fluctuation *out, const tal_frame *a, const tal_frame *b) {
     }
     i++, j++;
   }
+  out->start = tal_hash(x, out->count * sizeof *x) ^ (3 * tal_hash(y, out->count * sizeof *y));
   tal_fluctuation_of(x, y, out->u, out->v, out->count);
   free(in_a);
   free(in_b);

@@ -14,8 +14,9 @@ tal_status tal_metric_of_series(const tal_study_metric *metric, const tal_table 
 // where there are no cells).
 typedef struct tal_fluctuation {
   size_t count;
-  int64_t *id;   // owned; [count] ascending
-  double *u, *v; // owned; [count] [m]
+  int64_t *id;    // owned; [count] ascending
+  uint64_t start; // hash of their places at the begin: equal for runs from the same state
+  double *u, *v;  // owned; [count] [m]
 } tal_fluctuation;
 
 // Frames nearest to the metric's from and to in `dir`. Not further off than a twentieth of the window.

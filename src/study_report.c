@@ -214,7 +214,7 @@ static void put_lost(FILE *out, const tal_study_summary *s) {
       fprintf(out, "%-10s %s: %s\n", tal_study_status_name(result->state.status), s->study->runs[r].id,
               result->state.reason);
     else if (*result->note)
-      fprintf(out, "%-10s %s: %s\n", "incomplete", s->study->runs[r].id, result->note);
+      fprintf(out, "%-10s %s: %s\n", "note", s->study->runs[r].id, result->note);
   }
 }
 

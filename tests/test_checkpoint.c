@@ -17,7 +17,7 @@
 
 static const char other_text[] = "name: other\nseed: 3\n";
 
-static void write_here(const small_run *run, const char *name, const tal_sim *sim) {
+static void write_here(const small_run *run, const char *name, tal_sim *sim) {
   char path[TAL_PATH_SIZE];
   tal_error err;
   tal_run_files files = {.series_bytes = 1234, .series_step = 40, .tracks_step = -1};

@@ -324,7 +324,7 @@ static void test_hub(void **state) {
 }
 
 static double friction_work(const tal_sim *sim) {
-  double sum = 0;
+  double sum = sim->run.friction_work;
   for (size_t i = 0; i < sim->grains.count; i++)
     sum += sim->grains.friction_work[i];
   return sum;

@@ -50,7 +50,7 @@ static void write_instant(tal_output *output, tal_sim *sim) {
     fail_msg("%s", err.text);
 }
 
-static void write_checkpoint(tal_output *output, const tal_sim *sim) {
+static void write_checkpoint(tal_output *output, tal_sim *sim) {
   tal_error err;
   if (tal_output_checkpoint(output, sim, &err) != TAL_OK)
     fail_msg("%s", err.text);

@@ -234,7 +234,7 @@ static void draw_field(field *f, gsl_rng *rng) {
 }
 
 static tal_fluctuation whole(field *f) {
-  return (tal_fluctuation){POINTS, f->id, f->dx, f->dy};
+  return (tal_fluctuation){.count = POINTS, .id = f->id, .u = f->dx, .v = f->dy};
 }
 
 // ROUND: an affine field leaves nothing; added to another it changes nothing. EXACT: a field with itself gives 1, with

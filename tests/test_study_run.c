@@ -68,6 +68,8 @@ static void test_whole_study(void **state) {
   assert_int_equal(access(program_path(p, "out/figures/error_kinetic_at_0.01.png"), R_OK), 0);
   assert_int_equal(access(program_path(p, "out/figures/error_correlation.png"), R_OK), 0);
   assert_holds(p, "out/study.csv", "dt=5e-6,5e-6,correlation,yes,2,1,0,0,0,0,paired,2,1,0,");
+  // Both settings fall from the same places; with a window that begins later they do not.
+  assert_null(strstr(got.out, "another state"));
   program_run(p, WORDS("verify", "out/runs/dt-1e-5_s2"), &got);
   assert_outcome("a run of it", &got, 0, "");
   const uint64_t runs = content_hash(program_path(p, "out/runs.csv")),
@@ -77,6 +79,10 @@ static void test_whole_study(void **state) {
   assert_int_equal(count_lines(got.out), 1);
   assert_true(runs == content_hash(program_path(p, "out/runs.csv")));
   assert_true(series == content_hash(program_path(p, "out/runs/dt-1e-5_s2/series.csv")));
+  program_run(p, WORDS("study", "study.yaml", "-o", "out", "--merge", "--no-figures", "--set", "metrics.1.from=0.005"),
+              &got);
+  assert_outcome("later window", &got, 0, "");
+  assert_non_null(strstr(got.out, "note       dt-1e-5_s2: correlation_from_0.005: the run starts from another state"));
 }
 
 // EXACT: --plan runs nothing; its commands, run by a shell, leave what the study leaves; --merge before and after

@@ -94,11 +94,11 @@ static double phase(void (*body)(tal_sim *), tal_sim *sim, int count) {
 static void one_step(tal_sim *sim) {
   steps(sim, 1);
 }
-static void sweep(tal_sim *sim) {
-  tal_forces_sweep(sim, 0);
+static void drift(tal_sim *sim) {
+  tal_integrate_drift(sim, 0);
 }
-static void finish(tal_sim *sim) {
-  tal_forces_finish_step(sim, 0, 0);
+static void forces(tal_sim *sim) {
+  tal_forces_step(sim, 0, 0);
 }
 static void rebuild(tal_sim *sim) {
   tal_neighbours_rebuild(sim);
@@ -116,14 +116,13 @@ static void measure(const variant *v, int n) {
   double step = phase(one_step, sim, count);
   double grains = (double)sim->grains.count, listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
   int few = count / 10;
-  double t_sweep = phase(sweep, sim, few), t_finish = phase(finish, sim, few), t_list = phase(rebuild, sim, few / 10),
+  double t_drift = phase(drift, sim, few), t_forces = phase(forces, sim, few), t_list = phase(rebuild, sim, few / 10),
          t_graph = phase(refresh, sim, few / 10) / 250;
-  double rest = step - t_sweep - t_finish - t_list * listed - t_graph;
-  printf(
-      "%-40s %8d %7.1f   contacts %4.1f  gather+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
-      "%.2f\n",
-      v->name, n, 1e-6 * grains / step, 100 * t_sweep / step, 100 * t_finish / step, 100 * t_list * listed / step,
-      100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
+  double rest = step - t_drift - t_forces - t_list * listed - t_graph;
+  printf("%-40s %8d %7.1f   drift %4.1f  forces+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
+         "%.2f\n",
+         v->name, n, 1e-6 * grains / step, 100 * t_drift / step, 100 * t_forces / step, 100 * t_list * listed / step,
+         100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
   fflush(stdout);
   tal_sim_free(sim);
   tal_scene_clear(&scene);

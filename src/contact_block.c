@@ -1,0 +1,157 @@
+// A block goes through two loops: one fetches the records of the grains, four contacts at a time, and turns them into
+// arrays; one, a vector loop, works out geometry and law with selects in place of branches.
+#include "contact_block.h"
+
+// What a block of contacts brings; one array per quantity.
+typedef struct meetings {
+  double dx[TAL_BLOCK], dy[TAL_BLOCK]; // centre i - centre j
+  double ux[TAL_BLOCK], uy[TAL_BLOCK]; // velocity i - velocity j
+  double hx[TAL_BLOCK], hy[TAL_BLOCK]; // the same in the middle of the step
+  double spins[TAL_BLOCK];             // sum of the spins
+  double speeds[TAL_BLOCK];            // sum of radius times spin
+} __attribute__((aligned(64))) meetings;
+
+tal_sweep tal_sweep_of(const tal_sim *sim, double dt) {
+  const tal_scene_contact *law = &sim->scene->contact;
+  return (tal_sweep){.dt = dt,
+                     .moves = dt > 0,
+                     .law = sim->effects & TAL_EFFECT_LAW,
+                     .friction = sim->friction,
+                     .damping_time = sim->effects & TAL_EFFECT_HERTZ && isnan(sim->constants.damping_number)
+                                         ? sim->scene->material.damping
+                                         : (double)NAN,
+                     .constants = {.inverse_vR = 1 / sim->constants.vR,
+                                   .inverse_exponent = 1 / law->exponent,
+                                   .tangential_ratio = sim->constants.tangential_ratio}};
+}
+
+// Centres, and velocities where the law needs them.
+TAL_KERNEL void fetch_translation(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j,
+                                  int k, unsigned effects) {
+  tal_lanes v[4];
+  for (int m = 0; m < 4; m++)
+    v[m] = *(const tal_lanes *)&record[i[m]].x - *(const tal_lanes *)&record[j[m]].x;
+  tal_lanes_turn(v);
+  *(tal_lanes *)&b->dx[k] = v[0];
+  *(tal_lanes *)&b->dy[k] = v[1];
+  if (effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED)) {
+    *(tal_lanes *)&b->ux[k] = v[2];
+    *(tal_lanes *)&b->uy[k] = v[3];
+  }
+}
+
+TAL_KERNEL void fetch_spin(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j, int k) {
+  tal_lanes_pair p[4];
+  tal_lanes v[2];
+  for (int m = 0; m < 4; m++)
+    p[m] = *(const tal_lanes_pair *)&record[i[m]].spin + *(const tal_lanes_pair *)&record[j[m]].spin;
+  tal_lanes_turn_pairs(p, v);
+  *(tal_lanes *)&b->spins[k] = v[0];
+  *(tal_lanes *)&b->speeds[k] = v[1];
+}
+
+TAL_KERNEL void fetch_middle(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j, int k) {
+  tal_lanes_pair p[4];
+  tal_lanes v[2];
+  for (int m = 0; m < 4; m++)
+    p[m] = *(const tal_lanes_pair *)&record[i[m]].hx - *(const tal_lanes_pair *)&record[j[m]].hx;
+  tal_lanes_turn_pairs(p, v);
+  *(tal_lanes *)&b->hx[k] = v[0];
+  *(tal_lanes *)&b->hy[k] = v[1];
+}
+
+// Whole groups of four: the arrays of slots go on for a while after the last one (tal_neighbours_rebuild).
+TAL_KERNEL void fetch(meetings *b, const tal_sim *sim, size_t start, int count, unsigned effects) {
+  const int32_t *slot_i = sim->pairs.i + start, *slot_j = sim->pairs.j + start;
+  const tal_grain_record *record = sim->grain_records;
+  for (int k = 0; k < count; k += 4) {
+    fetch_translation(b, record, slot_i + k, slot_j + k, k, effects);
+    if (effects & TAL_EFFECT_SPRING)
+      fetch_middle(b, record, slot_i + k, slot_j + k, k);
+    if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_FRICTION))
+      fetch_spin(b, record, slot_i + k, slot_j + k, k);
+  }
+}
+
+TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep *sweep, size_t start, int count,
+                         tal_force_block *out, unsigned effects) {
+  const double *restrict dx = b->dx, *restrict dy = b->dy, *restrict ux = b->ux, *restrict uy = b->uy;
+  const double *restrict hx = b->hx, *restrict hy = b->hy, *restrict spins = b->spins, *restrict speeds = b->speeds;
+  const double *restrict reach = slots->reach + start, *restrict stiffness = slots->stiffness + start;
+  // one time for all contacts, as a scene with `damping` has it, saves an array
+  const bool own = isnan(sweep->damping_time);
+  const double *restrict viscous = (own ? slots->damping : slots->stiffness) + start;
+  const double damping_scale = own ? 1 : sweep->damping_time;
+  double unused[2][TAL_BLOCK]; // where histories go that are not to move
+  double *spring = slots->spring + start, *spring_stiffness = slots->spring_stiffness + start;
+  double *new_spring = sweep->moves ? spring : unused[0];
+  double *new_spring_stiffness = sweep->moves ? spring_stiffness : unused[1];
+  double *restrict ex = out->force[0], *restrict ey = out->force[1], *restrict vx = out->force[2];
+  double *restrict vy = out->force[3], *restrict tx = out->force[4], *restrict ty = out->force[5];
+  double *restrict ft = out->force[6], *restrict fh = out->force[7];
+  const tal_law_constants constants = sweep->constants;
+  const double friction = sweep->friction, dt = sweep->dt;
+#pragma omp simd
+  for (int k = 0; k < count; k++) {
+    double distance = sqrt(dx[k] * dx[k] + dy[k] * dy[k]);
+    double inverse = 1 / distance;
+    double x = dx[k] * inverse, y = dy[k] * inverse;
+    tal_meeting m = {.overlap = reach[k] - distance, .stiffness = stiffness[k], .friction = friction};
+    double half_overlap = 0.5 * m.overlap;
+    if (effects & TAL_EFFECT_DAMPING) {
+      m.damping = damping_scale * viscous[k];
+      m.approach = -(x * ux[k] + y * uy[k]);
+    }
+    if (effects & TAL_EFFECT_REGULARISED)
+      m.slip = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
+    if (effects & TAL_EFFECT_SPRING) {
+      m.slip_distance = dt * tal_slip_speed(x, y, hx[k], hy[k], half_overlap, speeds[k], spins[k], effects);
+      m.spring = spring[k];
+      m.spring_stiffness = spring_stiffness[k];
+    }
+    tal_law_force f = tal_contact_law(m, constants, effects);
+    ex[k] = f.fe * x;
+    ey[k] = f.fe * y;
+    vx[k] = effects & TAL_EFFECT_DAMPING ? f.fd * x : 0;
+    vy[k] = effects & TAL_EFFECT_DAMPING ? f.fd * y : 0;
+    if (effects & TAL_EFFECT_FRICTION) {
+      tx[k] = -f.ft * y;
+      ty[k] = f.ft * x;
+      ft[k] = f.ft;
+      fh[k] = f.ft * half_overlap;
+    }
+    if (effects & TAL_EFFECT_SPRING) {
+      new_spring[k] = f.ft;
+      new_spring_stiffness[k] = f.spring_stiffness;
+    }
+  }
+}
+
+TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out,
+                      unsigned effects) {
+  meetings b;
+  fetch(&b, sim, start, count, effects);
+  work_out(&b, &sim->pairs, sweep, start, count, out, effects);
+}
+
+// The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
+#define VARIANTS(X)                                                                                                    \
+  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN)                                  \
+  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)                                       \
+  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING)                                                                             \
+  X(TAL_EFFECT_HERTZ)                                                                                                  \
+  X(TAL_EFFECT_DAMPING)                                                                                                \
+  X(0)
+
+void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out) {
+  switch (sweep->law) {
+#define X(mask)                                                                                                        \
+  case (mask):                                                                                                         \
+    block(sim, sweep, start, count, out, (mask));                                                                      \
+    break;
+    VARIANTS(X)
+#undef X
+  default:
+    block(sim, sweep, start, count, out, sweep->law);
+  }
+}

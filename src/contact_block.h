@@ -1,0 +1,53 @@
+// Contacts in blocks: the records of two grains in, the forces of a block of slots out, one array per member. The
+// contact law (law.h) is instantiated here.
+#ifndef TAL_CONTACT_BLOCK_H
+#define TAL_CONTACT_BLOCK_H
+
+#include "lanes.h"
+#include "law.h"
+#include "sim.h"
+
+// Slots taken at a time.
+enum { TAL_BLOCK = 128 };
+
+// Members of tal_force_record, one array each.
+typedef struct tal_force_block {
+  double force[8][TAL_BLOCK];
+} __attribute__((aligned(64))) tal_force_block;
+
+// What one sweep over the slots has in common.
+typedef struct tal_sweep {
+  double dt;    // [s] moves the tangential springs; 0: none
+  bool moves;   // histories are written
+  unsigned law; // effects that the law looks at
+  double friction;
+  double damping_time; // [s] damping over stiffness; NAN: each slot its own damping
+  tal_law_constants constants;
+} tal_sweep;
+
+tal_sweep tal_sweep_of(const tal_sim *sim, double dt);
+// Forces of the grain-grain slots [start, start + count), count <= TAL_BLOCK, from the grain records. Members that the
+// effects leave out are zero.
+void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out);
+
+// Slip speed of i against j along t = (-ny, nx) with the lever arms r - d/2, eq (9): speeds is r_i w_i + r_j w_j, spins
+// is w_i + w_j.
+TAL_KERNEL double tal_slip_speed(double nx, double ny, double ux, double uy, double half_overlap, double speeds,
+                                 double spins, unsigned effects) {
+  double slip = nx * uy - ny * ux;
+  if (effects & TAL_EFFECT_SPIN)
+    slip -= speeds - half_overlap * spins;
+  return slip;
+}
+
+// The records of slots k ... k + 3, two vectors of four members each.
+TAL_KERNEL void tal_force_block_turn(const tal_force_block *b, int k, tal_lanes first[4], tal_lanes second[4]) {
+  for (int m = 0; m < 4; m++) {
+    first[m] = *(const tal_lanes *)&b->force[m][k];
+    second[m] = *(const tal_lanes *)&b->force[4 + m][k];
+  }
+  tal_lanes_turn(first);
+  tal_lanes_turn(second);
+}
+
+#endif

@@ -1,0 +1,214 @@
+// The force of every slot kept in a record of its own: for observers, and for friction that is solved after the sweep.
+// The last step kept nothing; its forces are worked out again from the grain records it left, to the same bits: a
+// spring that stands at its force and does not move answers with that force.
+#include "forces.h"
+
+#include "kick.h"
+
+#include <stdlib.h>
+
+// Grains summed at a time.
+enum { GRAINS = 64, PARALLEL_FROM = 2000 };
+
+// ---- sweep ----------------------------------------------------------------------------------------------------------
+
+static void keep_block(const tal_force_block *b, tal_force_record *out, int count) {
+  for (int k = 0; k < count; k += 4) {
+    tal_lanes first[4], second[4];
+    tal_force_block_turn(b, k, first, second);
+    for (int m = 0; m < 4 && k + m < count; m++) {
+      *(tal_lanes *)&out[k + m].elastic_x = first[m];
+      *(tal_lanes *)&out[k + m].friction_x = second[m];
+    }
+  }
+}
+
+void tal_forces_keep(tal_sim *sim) {
+  sim->forces_kept = true;
+  if (sim->force_capacity >= sim->pairs.count)
+    return;
+  free(sim->force_records);
+  sim->force_capacity = sim->pairs.capacity;
+  sim->force_records = tal_alloc(sim->force_capacity, sizeof *sim->force_records);
+}
+
+static void sweep_pairs(tal_sim *sim, double dt) {
+  const tal_sweep sweep = tal_sweep_of(sim, dt);
+  const size_t count = sim->pairs.count;
+  tal_forces_keep(sim);
+#pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
+  for (size_t start = 0; start < count; start += TAL_BLOCK) {
+    int here = (int)(count - start < TAL_BLOCK ? count - start : TAL_BLOCK);
+    tal_force_block b = {0};
+    tal_contact_block(sim, &sweep, start, here, &b);
+    keep_block(&b, sim->force_records + start, here);
+  }
+}
+
+// One grain-wall slot: the wall's own velocity counts, its lever arm is r - d.
+static void wall_slot(tal_sim *sim, const tal_sweep *sweep, size_t c) {
+  tal_contacts *slots = &sim->wall_contacts;
+  const tal_grain_record *g = &sim->grain_records[slots->i[c]];
+  const tal_wall *wall = &sim->walls.wall[slots->j[c]];
+  tal_wall_point near = tal_wall_nearest(wall, g->x, g->y);
+  tal_meeting m = {.overlap = slots->reach[c] - near.distance,
+                   .stiffness = slots->stiffness[c],
+                   .damping = slots->damping[c],
+                   .friction = slots->friction[c],
+                   .spring = slots->spring[c],
+                   .spring_stiffness = slots->spring_stiffness[c]};
+  double ux = g->ux - wall->vx, uy = g->uy - wall->vy, hx = g->hx - wall->vx, hy = g->hy - wall->vy;
+  m.approach = -(near.nx * ux + near.ny * uy);
+  m.slip = tal_slip_speed(near.nx, near.ny, ux, uy, m.overlap, g->r_spin, g->spin, sim->effects);
+  m.slip_distance = sweep->dt * tal_slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r_spin, g->spin, sim->effects);
+  tal_law_force f = tal_contact_law(m, sweep->constants, sweep->law);
+  slots->nx[c] = near.nx;
+  slots->ny[c] = near.ny;
+  slots->overlap[c] = m.overlap;
+  slots->fe[c] = f.fe;
+  slots->fd[c] = f.fd;
+  slots->ft[c] = f.ft;
+  if (sweep->moves) {
+    slots->spring[c] = f.ft;
+    slots->spring_stiffness[c] = f.spring_stiffness;
+  }
+}
+
+void tal_forces_sweep_walls(tal_sim *sim, double dt) {
+  const tal_sweep sweep = tal_sweep_of(sim, dt);
+  for (size_t c = 0; c < sim->wall_contacts.count; c++)
+    wall_slot(sim, &sweep, c);
+}
+
+void tal_forces_sweep(tal_sim *sim, double dt) {
+  sweep_pairs(sim, dt);
+  tal_forces_sweep_walls(sim, dt);
+}
+
+void tal_forces_see_now(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++)
+    sim->grain_records[i] = (tal_grain_record){g->x[i],  g->y[i],  g->vx[i],    g->vy[i],
+                                               g->vx[i], g->vy[i], g->omega[i], g->r[i] * g->omega[i]};
+}
+
+// ---- slots ----------------------------------------------------------------------------------------------------------
+
+// Geometry and forces of one grain-grain slot, from the centres and the force record.
+static void expand_pair(tal_sim *sim, size_t c) {
+  const tal_grains *g = &sim->grains;
+  tal_contacts *s = &sim->pairs;
+  const tal_force_record *f = &sim->force_records[c];
+  const int32_t i = s->i[c], j = s->j[c];
+  double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j];
+  double distance = sqrt(dx * dx + dy * dy), inverse = 1 / distance;
+  double nx = dx * inverse, ny = dy * inverse;
+  s->nx[c] = nx;
+  s->ny[c] = ny;
+  s->overlap[c] = g->r[i] + g->r[j] - distance;
+  s->fe[c] = f->elastic_x * nx + f->elastic_y * ny;
+  s->fd[c] = f->viscous_x * nx + f->viscous_y * ny;
+  s->ft[c] = sim->effects & TAL_EFFECT_FRICTION ? f->ft : 0;
+  s->slip[c] =
+      tal_slip_speed(nx, ny, g->vx[i] - g->vx[j], g->vy[i] - g->vy[j], 0.5 * s->overlap[c],
+                     g->r[i] * g->omega[i] + g->r[j] * g->omega[j], g->omega[i] + g->omega[j], TAL_EFFECT_SPIN);
+}
+
+void tal_forces_expand(tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  if (!sim->forces_kept && sim->effects & TAL_EFFECT_IMPLICIT)
+    tal_implicit_answer(sim);
+  else if (!sim->forces_kept)
+    sweep_pairs(sim, 0);
+  for (size_t c = 0; c < sim->pairs.count; c++)
+    expand_pair(sim, c);
+  tal_contacts *s = &sim->wall_contacts;
+  for (size_t c = 0; c < s->count; c++) {
+    int32_t i = s->i[c];
+    const tal_wall *wall = &sim->walls.wall[s->j[c]];
+    s->slip[c] = tal_slip_speed(s->nx[c], s->ny[c], g->vx[i] - wall->vx, g->vy[i] - wall->vy, s->overlap[c],
+                                g->r[i] * g->omega[i], g->omega[i], TAL_EFFECT_SPIN);
+  }
+}
+
+// ---- sums -----------------------------------------------------------------------------------------------------------
+
+typedef struct halves {
+  tal_lanes first, second; // of a force record
+} halves;
+
+// Sum over the grain-grain slots of one grain.
+static tal_force_record sum_pairs(const tal_sim *sim, size_t grain) {
+  const tal_lanes torque = {-1, -1, 1, 1}; // on the slot's j the vectors change sign, the torque does not
+  const int32_t *slot = sim->neighbours.slot;
+  const halves *record = (const halves *)sim->force_records;
+  halves sum = {{0}, {0}};
+  for (int32_t k = sim->neighbours.first[grain]; k < sim->neighbours.first[grain + 1]; k++) {
+    if (slot[k] >= 0) {
+      sum.first += record[slot[k]].first;
+      sum.second += record[slot[k]].second;
+    } else { // the grain is the slot's j
+      sum.first -= record[~slot[k]].first;
+      sum.second += torque * record[~slot[k]].second;
+    }
+  }
+  tal_force_record f;
+  memcpy(&f, &sum, sizeof f);
+  return f;
+}
+
+static void add_walls(const tal_sim *sim, size_t grain, tal_resultant *sum) {
+  const tal_contacts *s = &sim->wall_contacts;
+  for (int32_t c = sim->neighbours.wall_first[grain]; c < sim->neighbours.wall_first[grain + 1]; c++) {
+    sum->elastic_x += s->fe[c] * s->nx[c];
+    sum->elastic_y += s->fe[c] * s->ny[c];
+    sum->viscous_x += s->fd[c] * s->nx[c];
+    sum->viscous_y += s->fd[c] * s->ny[c];
+    sum->friction_x -= s->ft[c] * s->ny[c];
+    sum->friction_y += s->ft[c] * s->nx[c];
+    sum->torque -= s->ft[c] * (sim->grains.r[grain] - s->overlap[c]);
+  }
+}
+
+tal_resultant tal_forces_gather(const tal_sim *sim, size_t grain) {
+  tal_force_record sum = sum_pairs(sim, grain);
+  tal_resultant f = {sum.elastic_x, sum.elastic_y, sum.viscous_x, sum.viscous_y, 0, 0, 0};
+  if (sim->effects & TAL_EFFECT_FRICTION) {
+    f.friction_x = sum.friction_x;
+    f.friction_y = sum.friction_y;
+    f.torque = sum.ft_half_overlap - sim->grains.r[grain] * sum.ft;
+  }
+  if (sim->effects & TAL_EFFECT_WALLS)
+    add_walls(sim, grain, &f);
+  return f;
+}
+
+void tal_forces_resultants(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  for (size_t i = 0; i < g->count; i++) {
+    tal_resultant f = tal_forces_gather(sim, i);
+    g->rx[i] = f.elastic_x + f.viscous_x + f.friction_x;
+    g->ry[i] = f.elastic_y + f.viscous_y + f.friction_y;
+    g->rtorque[i] = f.torque;
+    if (sim->effects & TAL_EFFECT_BOUNDARY) {
+      g->rx[i] += g->bx[i];
+      g->ry[i] += g->by[i];
+    }
+  }
+}
+
+void tal_forces_finish_step(tal_sim *sim, double dt, double credit) {
+  const size_t count = sim->grains.count;
+#pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
+  for (size_t start = 0; start < count; start += GRAINS) {
+    int here = (int)(count - start < GRAINS ? count - start : GRAINS);
+    tal_force_block sums;
+    for (int k = 0; k < here; k++) {
+      tal_force_record f = sum_pairs(sim, start + (size_t)k);
+      const double *member = &f.elastic_x;
+      for (int m = 0; m < 8; m++)
+        sums.force[m][k] = member[m];
+    }
+    tal_kick(sim, &sums, start, here, dt, credit);
+  }
+}
