@@ -2,7 +2,8 @@
 
 #include <string.h>
 
-static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, NULL};
+static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, &tal_boundary_membrane, &tal_boundary_minimal,
+                                                 NULL};
 
 const tal_boundary *tal_boundary_find(const char *name) {
   for (const tal_boundary *const *k = boundaries; *k; k++)
@@ -16,4 +17,13 @@ size_t tal_boundary_choices(tal_choice *out, size_t capacity) {
   for (; boundaries[count] && count < capacity; count++)
     out[count] = (tal_choice){boundaries[count]->name, boundaries[count]->help};
   return count;
+}
+
+size_t tal_method_choices(tal_choice *out, size_t capacity) {
+  static const tal_choice methods[] = {{"exact", "the multiplier is solved for in every step: no error, no constant"},
+                                       {"penalty", "a force in proportion to the error of the strain rate [P 3.4]"}};
+  size_t count = sizeof methods / sizeof *methods;
+  for (size_t k = 0; k < count && k < capacity; k++)
+    out[k] = methods[k];
+  return count < capacity ? count : capacity;
 }

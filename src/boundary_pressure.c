@@ -99,5 +99,8 @@ static void apply(tal_sim *sim) {
   press_arc(sim, run->arc_top_left, edges_between(loop, run->arc_top_left, run->arc_bottom_left));
 }
 
-const tal_boundary tal_boundary_pressure = {"pressure", "pressure on the grains of the Delaunay boundary", refreshed,
-                                            apply};
+const tal_boundary tal_boundary_pressure = {.name = "pressure",
+                                            .help = "pressure on the grains of the Delaunay boundary",
+                                            .plates = true,
+                                            .refreshed = refreshed,
+                                            .apply = apply};

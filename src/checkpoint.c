@@ -1,6 +1,6 @@
-// See checkpoint.h. Groups: /run and /files (attributes), /frames, /grains, /contacts, /wall_contacts, /walls, /graph;
-// the scene is the text /scene. Slots are kept where history hangs on them (a spring); the others follow from the
-// centres.
+// See checkpoint.h. Groups: /run and /files (attributes), /frames, /grains, /contacts, /wall_contacts, /walls, /graph,
+// /minimal; the scene is the text /scene. Slots are kept where history hangs on them (a spring); the others follow from
+// the centres.
 #include "checkpoint.h"
 
 #include "files.h"
@@ -125,6 +125,20 @@ static void put_graph(tal_store *store, const tal_graph *graph) {
   tal_store_put(store, TAL_ARRAY("y", "m", graph->y, graph->grain_count));
 }
 
+static void put_membrane(tal_store *store, const tal_membrane *membrane) {
+  tal_store_group(store, "membrane");
+#define X(type, name, unit, kept, meaning)                                                                             \
+  IF_##kept(tal_store_put(store, TAL_ARRAY(#name, unit, membrane->name, membrane->count));)
+  TAL_BEAD_FIELDS(X)
+#undef X
+}
+
+// Forces by which a minimal boundary held its rows at the last step.
+static void put_multipliers(tal_store *store, const tal_rows *rows) {
+  tal_store_group(store, "minimal");
+  tal_store_put(store, TAL_ARRAY("multiplier", "Pa", (double *)rows->multiplier, TAL_ROWS_MOST));
+}
+
 tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim *sim, const char *scene_text,
                                 const tal_run_files *files, tal_error *err) {
   tal_store store;
@@ -137,6 +151,8 @@ tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim 
   put_contacts(&store, "wall_contacts", &sim->wall_contacts);
   put_walls(&store, &sim->walls);
   put_graph(&store, &sim->graph);
+  put_multipliers(&store, &sim->rows);
+  put_membrane(&store, &sim->membrane);
   return tal_store_save(&store, path, previous, err);
 }
 
@@ -282,6 +298,15 @@ static void get_walls(tal_store *store, tal_walls *walls) {
 #undef X
 }
 
+static void get_membrane(tal_store *store, tal_membrane *membrane) {
+  tal_store_group(store, "membrane");
+  tal_membrane_init(membrane, tal_store_rows(store, "x"));
+#define X(type, name, unit, kept, meaning)                                                                             \
+  IF_##kept(tal_store_get(store, TAL_ARRAY(#name, unit, membrane->name, membrane->count));)
+  TAL_BEAD_FIELDS(X)
+#undef X
+}
+
 static bool below(const int32_t *index, size_t count, size_t limit) {
   for (size_t k = 0; k < count; k++) {
     if (index[k] < 0 || (size_t)index[k] >= limit)
@@ -346,6 +371,9 @@ tal_status tal_checkpoint_read(const char *path, tal_sim *sim, const char *scene
     get_contacts(&store, "wall_contacts", &sim->wall_contacts);
     get_walls(&store, &sim->walls);
     get_graph(&store, &sim->graph, sim->grains.count);
+    tal_store_group(&store, "minimal");
+    tal_store_get(&store, TAL_ARRAY("multiplier", NULL, sim->rows.multiplier, TAL_ROWS_MOST));
+    get_membrane(&store, &sim->membrane);
     check_slots(&store, sim);
     sim->run = head.run;
     *files = head.files;

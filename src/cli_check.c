@@ -1,6 +1,7 @@
 // talus check SCENE.yaml [--set K=V]...: validates, packs, and prints what the run would be and cost. Writes nothing.
 #include "cli.h"
 
+#include "boundary_minimal.h"
 #include "critical.h"
 #include "damping.h"
 #include "effects.h"
@@ -66,8 +67,8 @@ static double planned_steps(const tal_scene *scene) {
     double duration = stage->duration > 0 ? stage->duration : 0;
     if (stage->ramp > 0)
       duration = 2 * stage->ramp;
-    if (stage->rate > 0)
-      duration = stage->strain / stage->rate;
+    if (stage->strain > 0)
+      duration = stage->strain / fabs(stage->rate);
     steps += duration / stage->integrator.dt;
   }
   return steps;
@@ -95,8 +96,8 @@ static double first_pressure(const tal_scene *scene) {
 
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0)
-      return scene->stages[s].rate;
+    if (fabs(scene->stages[s].rate) > 0)
+      return fabs(scene->stages[s].rate);
   return (double)NAN;
 }
 
@@ -154,9 +155,9 @@ static void print_quasistatic(const tal_sim *sim, double height) {
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_stage *stage = &scene->stages[s];
     double pressure = stage->pressure > 0 ? stage->pressure : first_pressure(scene);
-    if (!(stage->rate > 0) || isnan(pressure))
+    if (!(fabs(stage->rate) > 0) || isnan(pressure))
       continue;
-    double phi = tal_quasistatic_coefficient(sim, stage->rate, pressure, height);
+    double phi = tal_quasistatic_coefficient(sim, fabs(stage->rate), pressure, height);
     printf("phi, psi      %.4g (quasi-static well below 1), %.4g (size, 2R/L) in stage %zu", phi, psi, s);
     if (!any_listed_mass(scene))
       printf("; phi is %g at mass_scaling %.3g", TAL_QUASISTATIC_LIMIT,
@@ -193,6 +194,23 @@ static void print_numbers(const tal_sim *sim) {
   print_quasistatic(sim, height);
 }
 
+// What the explicit step lets a penalty be, for the loop of the packing; contacts take their share of it later.
+static void print_penalties(tal_sim *sim) {
+  for (size_t s = 0; s < sim->scene->stage_count; s++) {
+    const tal_scene_stage *stage = &sim->scene->stages[s];
+    if (!stage->method || strcmp(stage->method, "penalty") != 0)
+      continue;
+    const double dt = (double)tal_integrate_longest(&stage->integrator) * stage->integrator.dt;
+    double limit = tal_minimal_penalty_limit(tal_minimal_decay_planned(sim, stage), dt, (double)INFINITY);
+    printf("penalty       stage %zu: explicit limit K < %.4g N m s at dt = %g s, less what contacts take", s, limit,
+           dt);
+    if (isnan(stage->penalty))
+      printf("; half of what is left is taken\n");
+    else
+      printf("; K is %.3g times that\n", stage->penalty / limit);
+  }
+}
+
 static void print_cost(tal_sim *sim) {
   double steps = planned_steps(sim->scene), grains = (double)sim->grains.count;
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
@@ -224,6 +242,7 @@ int tal_cli_check(int argc, char **argv) {
     printf("scene         %s: valid\n", options.argument);
     print_effects(sim);
     print_numbers(sim);
+    print_penalties(sim);
     print_cost(sim);
     tal_sim_free(sim);
   }

@@ -1,5 +1,6 @@
 #include "critical.h"
 
+#include "boundary.h"
 #include "damping.h"
 #include "effects.h"
 #include "law.h"
@@ -60,6 +61,8 @@ double tal_critical_step(const tal_sim *sim) {
   add_slots(sim, &sim->pairs, true, sum);
   add_slots(sim, &sim->wall_contacts, false, sum);
   double least = (double)INFINITY;
+  if (sim->boundary && sim->boundary->critical)
+    least = sim->boundary->critical(sim, sum);
   const tal_contacts *s = &sim->pairs;
   for (size_t c = 0; c < s->count; c++) {
     if (s->overlap[c] <= 0)

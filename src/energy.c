@@ -21,7 +21,7 @@ double tal_energy_gravity(const tal_grains *g, const double gravity[2]) {
   return sum;
 }
 
-static double normal_energy(const tal_sim *sim, const tal_contacts *s, size_t c) {
+double tal_energy_normal(const tal_sim *sim, const tal_contacts *s, size_t c) {
   if (s->overlap[c] <= 0)
     return 0;
   return sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_energy(s->stiffness[c], s->overlap[c])
@@ -46,9 +46,9 @@ double tal_energy_springs(const tal_sim *sim) {
 double tal_energy_elastic(const tal_sim *sim) {
   double sum = 0;
   for (size_t c = 0; c < sim->pairs.count; c++)
-    sum += normal_energy(sim, &sim->pairs, c);
+    sum += tal_energy_normal(sim, &sim->pairs, c);
   for (size_t c = 0; c < sim->wall_contacts.count; c++)
-    sum += normal_energy(sim, &sim->wall_contacts, c);
+    sum += tal_energy_normal(sim, &sim->wall_contacts, c);
   return sum + tal_energy_springs(sim);
 }
 
@@ -83,13 +83,20 @@ void tal_energy_credit(tal_sim *sim, double weight) {
     g->boundary_work[i] += weight * p.boundary;
     g->held_work[i] += weight * p.held;
   }
+  sim->run.correcting_work += weight * sim->run.correcting_power;
+  tal_membrane_credit(sim, weight);
+}
+
+// Length of what has been credited beyond this instant [s]: at the end of a stage nothing.
+static double last_half(const tal_sim *sim) {
+  return sim->stage && !sim->run.stage_done ? 0.5 * sim->dt : 0;
 }
 
 // Accounts of the grains with the last instant counted half.
 static power grain_works(const tal_sim *sim) {
   const tal_grains *g = &sim->grains;
   power sum = {.friction = sim->run.friction_work, .damping = sim->run.damping_work};
-  double half = sim->stage && !sim->run.stage_done ? 0.5 * sim->dt : 0;
+  double half = last_half(sim);
   for (size_t i = 0; i < g->count; i++) {
     power p = grain_power(sim, i);
     sum.friction += g->friction_work[i] - half * p.friction;
@@ -100,29 +107,42 @@ static power grain_works(const tal_sim *sim) {
   return sum;
 }
 
+// What goes through a membrane, with the last instant counted half.
+static tal_membrane_power membrane_works(const tal_sim *sim) {
+  const tal_run *run = &sim->run;
+  const double half = last_half(sim);
+  return (tal_membrane_power){.pressure = run->membrane_pressure_work - half * run->membrane_pressure_power,
+                              .ends = run->membrane_ends_work - half * run->membrane_ends_power,
+                              .grains = run->membrane_grains_work - half * run->membrane_grains_power,
+                              .lost = run->membrane_lost_work - half * run->membrane_lost_power};
+}
+
 void tal_energy_row(const tal_sim *sim, tal_row *row) {
-  power work = grain_works(sim);
-  double wall = 0, wall_friction = 0, wall_damping = 0;
+  const tal_run *run = &sim->run;
+  const power work = grain_works(sim);
+  const tal_membrane_power membrane = membrane_works(sim);
+  double wall = membrane.ends, wall_friction = 0, wall_damping = 0;
   for (size_t w = 0; w < sim->walls.count; w++) {
     wall += sim->walls.wall[w].work;
     wall_friction += sim->walls.wall[w].friction_work;
     wall_damping += sim->walls.wall[w].damping_work;
   }
-  row->kinetic = tal_energy_kinetic(&sim->grains);
-  row->elastic = tal_energy_elastic(sim);
+  row->kinetic = tal_energy_kinetic(&sim->grains) + tal_membrane_kinetic(&sim->membrane);
+  row->elastic = tal_energy_elastic(sim) + tal_membrane_elastic(sim);
   row->gravity = tal_energy_gravity(&sim->grains, sim->scene->gravity);
   row->work_walls = wall;
-  row->work_pressure = work.boundary;
+  row->work_minimal = run->correcting_work - last_half(sim) * run->correcting_power;
+  row->work_pressure = work.boundary - row->work_minimal - membrane.grains + membrane.pressure;
+  row->work_membrane = run->membrane_brought;
   row->work_held = work.held;
   row->dissipated_friction = wall_friction - work.friction - tal_energy_springs(sim);
-  row->dissipated_damping = wall_damping - work.damping;
-  double change =
-      row->kinetic - sim->run.kinetic0 + row->elastic - sim->run.elastic0 + row->gravity - sim->run.gravity0;
-  double input = wall + work.boundary + work.held;
+  row->dissipated_damping = wall_damping - work.damping + membrane.lost;
+  double change = row->kinetic - run->kinetic0 + row->elastic - run->elastic0 + row->gravity - run->gravity0;
+  double input = wall + row->work_pressure + row->work_minimal + row->work_membrane + work.held;
   double missing = change + row->dissipated_friction + row->dissipated_damping - input;
   // The scale: everything that changed hands, and what was there to begin with.
-  double scale = fabs(wall) + fabs(work.boundary) + fabs(work.held) + fabs(row->dissipated_friction) +
-                 fabs(row->dissipated_damping) + fabs(row->gravity - sim->run.gravity0) + sim->run.kinetic0 +
-                 sim->run.elastic0;
+  double scale = fabs(wall) + fabs(row->work_pressure) + fabs(row->work_minimal) + fabs(row->work_membrane) +
+                 fabs(work.held) + fabs(row->dissipated_friction) + fabs(row->dissipated_damping) +
+                 fabs(row->gravity - run->gravity0) + run->kinetic0 + run->elastic0;
   row->energy_residual = scale > 0 ? missing / scale : 0;
 }

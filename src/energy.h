@@ -5,10 +5,11 @@
 
 #include "sim.h"
 
-double tal_energy_kinetic(const tal_grains *grains);                          // [J]
-double tal_energy_gravity(const tal_grains *grains, const double gravity[2]); // [J]
-double tal_energy_elastic(const tal_sim *sim);                                // [J] springs included
-double tal_energy_springs(const tal_sim *sim);                                // [J] tangential springs alone
+double tal_energy_kinetic(const tal_grains *grains);                               // [J]
+double tal_energy_gravity(const tal_grains *grains, const double gravity[2]);      // [J]
+double tal_energy_elastic(const tal_sim *sim);                                     // [J] springs included
+double tal_energy_springs(const tal_sim *sim);                                     // [J] tangential springs alone
+double tal_energy_normal(const tal_sim *sim, const tal_contacts *slots, size_t c); // [J] of one slot's normal force
 
 // Credits the grains' accounts with `weight` [s] times the power of the forces of this (observed) instant. A run
 // credits dt per step; the first and last instants of a stage count half.

@@ -19,6 +19,8 @@ tal_map tal_map_of_frame(const tal_frame *frame) {
   tal_map m = {HUGE_VAL, HUGE_VAL, -HUGE_VAL, -HUGE_VAL, .top = 0};
   for (size_t k = 0; k < frame->grain_count; k++)
     tal_map_include(&m, frame->x[k], frame->y[k], frame->r[k]);
+  for (size_t k = 0; k < frame->bead_count; k++)
+    tal_map_include(&m, frame->bx[k], frame->by[k], frame->br[k]);
   if (!(m.x1 > m.x0))
     m.x0 = m.y0 = 0, m.x1 = m.y1 = 1e-3;
   return m;

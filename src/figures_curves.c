@@ -26,10 +26,34 @@ typedef struct curves {
   size_t count;
 } curves;
 
-// The compression against axial strain in %, else everything against time. Returns the label of the axis.
+// Largest magnitude of a column; 0 where it is not there.
+static double column_reach(const tal_table *series, const char *name) {
+  const double *column = tal_table_column(series, name);
+  double most = 0;
+  for (size_t row = 0; column && row < series->rows; row++)
+    most = isfinite(column[row]) ? fmax(most, fabs(column[row])) : most;
+  return most;
+}
+
+// The row before the first shear.
+static size_t shear_begin(const tal_table *series, const double *shear) {
+  size_t row = 0;
+  while (row + 1 < series->rows && shear[row + 1] == 0)
+    row++;
+  return row;
+}
+
+// The compression against axial strain in %, shearing against shear strain, else everything against time. Returns the
+// label of the axis.
 static const char *curves_over_strain(curves *set, const tal_figure_data *data) {
   bool strained = data->offers & TAL_NEEDS_STRAIN;
   *set = (curves){.series = &data->series, .end = data->series.rows};
+  if (column_reach(&data->series, "shear_strain") > column_reach(&data->series, "axial_strain")) {
+    set->x = tal_table_column(&data->series, "shear_strain");
+    set->x_scale = 100;
+    set->begin = shear_begin(&data->series, set->x);
+    return "shear strain (%)";
+  }
   set->begin = strained ? data->strain_begin : 0;
   set->x = tal_table_column(&data->series, strained ? "axial_strain" : "time");
   set->x_scale = strained ? 100 : 1;

@@ -127,6 +127,13 @@ static void read_contacts(reading *in, tal_frame *frame) {
   free(overlap);
 }
 
+static void read_beads(reading *in, tal_frame *frame) {
+  size_t n = frame->bead_count = extent(in->file, "/membrane/x", "/membrane");
+  frame->bx = read_reals(in, "/membrane", "/membrane/x", n);
+  frame->by = read_reals(in, "/membrane", "/membrane/y", n);
+  frame->br = read_reals(in, "/membrane", "/membrane/r", n);
+}
+
 static void read_cells(reading *in, tal_frame *frame) {
   size_t n = frame->cell_count = extent(in->file, "/cells/i", "/cells");
   static const char *const corner[3] = {"/cells/i", "/cells/j", "/cells/k"};
@@ -186,6 +193,7 @@ tal_status tal_frame_read(tal_frame *frame, const char *path, tal_error *err) {
   read_contacts(&in, frame);
   read_cells(&in, frame);
   read_walls(&in, frame);
+  read_beads(&in, frame);
   H5Fclose(in.file);
   quiet_end(old);
   if (!in.failed)
@@ -195,10 +203,10 @@ tal_status tal_frame_read(tal_frame *frame, const char *path, tal_error *err) {
 }
 
 void tal_frame_clear(tal_frame *frame) {
-  void *const owned[] = {frame->id,    frame->x,         frame->y,         frame->r,
-                         frame->theta, frame->i,         frame->j,         frame->fn,
-                         frame->wall,  frame->corner[0], frame->corner[1], frame->corner[2],
-                         frame->L_II,  frame->pressure,  frame->area,      frame->loop};
+  void *const owned[] = {frame->id,        frame->x,         frame->y,    frame->r,        frame->theta,
+                         frame->i,         frame->j,         frame->fn,   frame->wall,     frame->corner[0],
+                         frame->corner[1], frame->corner[2], frame->L_II, frame->pressure, frame->area,
+                         frame->loop,      frame->bx,        frame->by,   frame->br};
   for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
     free(owned[k]);
   *frame = (tal_frame){0};

@@ -1,4 +1,5 @@
-// The field frames DIR/fields/NNNNNN.h5 as the figures need them: grains, contacts, walls, cells, loop.
+// The field frames DIR/fields/NNNNNN.h5 as the figures need them: grains, contacts, walls, beads, cells,
+// loop.
 #ifndef TAL_FIGURES_FRAMES_H
 #define TAL_FIGURES_FRAMES_H
 
@@ -26,6 +27,8 @@ typedef struct tal_frame {
   double *fn;                // owned; [contact_count] normal force [N]
   size_t wall_count;         // walls and plates there at this time
   double (*wall)[4];         // owned; [wall_count] x0 y0 x1 y1 [m]; a plate as wide as the grains lie
+  size_t bead_count;         // of a membrane
+  double *bx, *by, *br;      // owned; [bead_count] [m]
   size_t cell_count;
   int64_t *corner[3]; // owned; [cell_count] grain indices
   double *L_II;       // owned; [cell_count] [1/s]

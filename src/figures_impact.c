@@ -27,8 +27,8 @@ tal_status tal_impact_study_of(const tal_scene *scene, const tal_constants *cons
                               .speed = isnan(speed) ? 1 : speed,
                               .reference = (double)NAN};
   for (size_t s = scene->stage_count; s-- > 0;)
-    if (scene->stages[s].rate > 0)
-      study->reference = 1 / scene->stages[s].rate; // the first one's in the end
+    if (fabs(scene->stages[s].rate) > 0)
+      study->reference = 1 / fabs(scene->stages[s].rate); // the first one's in the end
   return TAL_OK;
 }
 

@@ -21,6 +21,17 @@ static void draw_discs(const tal_frame *frame, tal_plot *plot) {
           disc_border(frame->grain_count));
 }
 
+static void draw_beads(const tal_frame *frame, tal_plot *plot) {
+  if (!frame->bead_count)
+    return;
+  FILE *data = tal_plot_data(plot, "beads");
+  for (size_t k = 0; data && k < frame->bead_count; k++)
+    fprintf(data, "%.9g %.9g %.6g\n", 1e3 * frame->bx[k], 1e3 * frame->by[k], 1e3 * frame->br[k]);
+  tal_plot_data_end(plot, data);
+  tal_plot_element(plot);
+  fputs("'beads' using 1:2:3 with circles lc rgb '#7a7a7a' fs solid border lc rgb '#4d4d4d'", plot->script);
+}
+
 static double mean_of(const double *value, size_t count) {
   double sum = 0;
   size_t good = 0;
@@ -77,6 +88,7 @@ static void draw_grains(const tal_figure_data *data, const tal_frame *frame, tal
   if (forces)
     tal_map_heading(&m, plot, 2, "line width ∝ f_n,  ⟨f_n⟩ = %.3g N", mean);
   draw_discs(frame, plot);
+  draw_beads(frame, plot);
   tal_map_walls(frame, plot);
   if (forces)
     draw_chains(frame, plot, mean, 0.1 * diameter * m.scale);

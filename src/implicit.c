@@ -1,5 +1,6 @@
 #include "implicit.h"
 
+#include "boundary.h"
 #include "forces.h"
 #include "law.h"
 #include "sim.h"
@@ -341,6 +342,13 @@ static double take_variant(const solve *s, pass what, size_t start, int count, d
   }
 }
 
+// What a boundary imposes on the loop is met by forces of its own, found beside those of the contacts.
+static void couple(const solve *s, bool first) {
+  const tal_boundary *boundary = s->sim->boundary;
+  if (boundary && boundary->couple && s->advances)
+    boundary->couple(s->sim, s->kick, first);
+}
+
 // One block of the colour that begins at lane `from`.
 static void take(const solve *s, pass what, size_t from, size_t start, size_t to, size_t size, double factor) {
   const int count = (int)(to - start < size ? to - start : size);
@@ -383,6 +391,7 @@ static tal_implicit_works take_down(const solve *s, double all) {
   for (size_t lane = 0; lane < m->lanes; lane++)
     m->lane.ft[lane] *= share;
   sweep(s, PRESS, 1);
+  couple(s, false);
   return work(s);
 }
 
@@ -391,10 +400,15 @@ static tal_implicit_works settle(const solve *s, const tal_scene_integrator *pla
   int64_t sweeps = s->advances ? plan->sweeps : MORE_SWEEPS;
   double change = 0;
   sweep(s, BEGIN, 0);
-  for (int64_t k = 0; k < sweeps; k++)
+  couple(s, true);
+  for (int64_t k = 0; k < sweeps; k++) {
     change = sweep(s, CORRECT, 0);
-  for (int k = 0; k < MOST_SWEEPS && change > plan->tolerance; k++)
+    couple(s, false);
+  }
+  for (int k = 0; k < MOST_SWEEPS && change > plan->tolerance; k++) {
     change = sweep(s, CORRECT, 0);
+    couple(s, false);
+  }
   if (!s->advances)
     return (tal_implicit_works){0, 0};
   tal_implicit_works done = work(s);
@@ -402,6 +416,7 @@ static tal_implicit_works settle(const solve *s, const tal_scene_integrator *pla
     return done;
   for (int k = 0; done.friction > 0 && k < MORE_SWEEPS; k++) {
     sweep(s, CORRECT, 0);
+    couple(s, false);
     done = work(s);
   }
   return done.friction > 0 ? take_down(s, done.friction) : done;
@@ -526,6 +541,10 @@ static void book(tal_sim *sim, tal_implicit_works done, double credit) {
 
 void tal_implicit_step(tal_sim *sim, double credit) {
   tal_implicit_works done = solve_all(sim, sim->dt, true);
+  if (sim->boundary && sim->boundary->coupled) {
+    sim->boundary->coupled(sim, sim->dt);
+    sim->run.correcting_work += credit * sim->run.correcting_power;
+  }
   if (sim->implicit.all_free) {
     take_velocities(sim, credit);
     book(sim, done, credit);

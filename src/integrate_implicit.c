@@ -8,18 +8,15 @@
 #include "integrate.h"
 
 #include "effects.h"
-#include "forces.h"
 #include "implicit.h"
-#include "walls_load.h"
 
 static void advance(tal_sim *sim) {
   tal_integrate_drift(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     tal_implicit_step(sim, tal_integrate_credit(sim));
   else
-    tal_forces_step(sim, sim->dt, tal_integrate_credit(sim));
-  if (sim->effects & TAL_EFFECT_WALLS)
-    tal_walls_take_loads(sim, sim->dt);
+    tal_integrate_forces(sim);
+  tal_integrate_end(sim);
 }
 
 const tal_integrator tal_implicit_friction = {

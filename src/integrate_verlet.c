@@ -105,17 +105,38 @@ void tal_integrate_drift(tal_sim *sim, double dt) {
   const double moved = drift_all(sim, dt);
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_drift(sim);
+  if (sim->boundary && sim->boundary->drift)
+    sim->boundary->drift(sim, dt);
   if (tal_neighbours_stale(sim, moved))
     tal_neighbours_rebuild(sim);
   if (sim->boundary)
     sim->boundary->apply(sim);
 }
 
-void tal_integrate_verlet_step(tal_sim *sim) {
-  tal_integrate_drift(sim, sim->dt);
-  tal_forces_step(sim, sim->dt, tal_integrate_credit(sim));
+// Where the boundary imposes something it has to know the forces of the contacts first.
+void tal_integrate_forces(tal_sim *sim) {
+  const double credit = tal_integrate_credit(sim);
+  if (!sim->boundary || !sim->boundary->constrain) {
+    tal_forces_step(sim, sim->dt, credit);
+    return;
+  }
+  tal_forces_sweep(sim, sim->dt);
+  sim->boundary->constrain(sim, 0.5 * sim->dt, 0.5 * sim->dt_next);
+  sim->run.correcting_work += credit * sim->run.correcting_power;
+  tal_forces_finish_step(sim, sim->dt, credit);
+}
+
+void tal_integrate_end(tal_sim *sim) {
+  if (sim->boundary && sim->boundary->finish)
+    sim->boundary->finish(sim, sim->dt, tal_integrate_credit(sim));
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_take_loads(sim, sim->dt);
+}
+
+void tal_integrate_verlet_step(tal_sim *sim) {
+  tal_integrate_drift(sim, sim->dt);
+  tal_integrate_forces(sim);
+  tal_integrate_end(sim);
 }
 
 const tal_integrator tal_verlet = {.name = "verlet",

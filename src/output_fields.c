@@ -114,6 +114,14 @@ static void put_walls(tal_store *store, const tal_walls *walls) {
 #undef X
 }
 
+static void put_membrane(tal_store *store, const tal_membrane *membrane) {
+  tal_store_group(store, "membrane");
+#define X(type, name, unit, kept, meaning)                                                                             \
+  IF_##kept(tal_store_put(store, TAL_ARRAY(#name, unit, membrane->name, membrane->count));)
+  TAL_BEAD_FIELDS(X)
+#undef X
+}
+
 static void put_cell_tensors(tal_store *store, const tal_cells *cells) {
   const size_t n = cells->count;
   double *table = tal_alloc(4 * n, sizeof *table);
@@ -179,6 +187,8 @@ static tal_status write_frame(const char *path, tal_sim *sim, size_t *cells, tal
   put_contacts(&store, "contacts", seen.pairs);
   put_contacts(&store, "wall_contacts", seen.walls);
   put_walls(&store, &sim->walls);
+  if (sim->membrane.count)
+    put_membrane(&store, &sim->membrane);
   *cells = put_cells(&store, &seen);
   put_loop(&store, seen.graph);
   return tal_store_save(&store, path, NULL, err);

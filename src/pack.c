@@ -132,24 +132,43 @@ static void keep_grain(tal_packing *packing, size_t to, size_t from) {
     packing->fixed[to] = packing->fixed[from];
 }
 
-static tal_status cut_circle(const tal_scene *scene, tal_packing *packing, tal_error *err) {
-  double radius = scene->pack.cut_radius, box[4];
-  if (isnan(radius))
+// Is (x, y) inside the polygon: an odd number of its edges crosses the ray to the right.
+static bool in_polygon(const double (*corner)[2], size_t count, double x, double y) {
+  bool inside = false;
+  for (size_t k = 0; k < count; k++) {
+    const double *a = corner[k], *b = corner[(k + 1) % count];
+    if ((a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) * (b[0] - a[0]) / (b[1] - a[1]))
+      inside = !inside;
+  }
+  return inside;
+}
+
+static bool in_cut(const tal_scene_pack *pack, double dx, double dy) {
+  if (pack->cut_shape == TAL_CUT_POLYGON)
+    return in_polygon((const double(*)[2])pack->cut_points, pack->cut_point_count, dx, dy);
+  return sqrt(dx * dx + dy * dy) <= pack->cut_radius;
+}
+
+static tal_status cut(const tal_scene *scene, tal_packing *packing, tal_error *err) {
+  const tal_scene_pack *pack = &scene->pack;
+  double box[4];
+  if (isnan(pack->cut_radius))
     return TAL_OK;
   tal_packing_box(packing, box);
   double x = 0.5 * (box[0] + box[1]), y = 0.5 * (box[2] + box[3]);
   size_t kept = 0;
-  for (size_t i = 0; i < packing->count; i++) {
-    double dx = packing->x[i] - x, dy = packing->y[i] - y;
-    if (sqrt(dx * dx + dy * dy) <= radius)
+  for (size_t i = 0; i < packing->count; i++)
+    if (in_cut(pack, packing->x[i] - x, packing->y[i] - y))
       keep_grain(packing, kept++, i);
-  }
   packing->count = kept;
   packing->width = (double)NAN;
   if (kept > 0)
     return TAL_OK;
-  return tal_pack_fail(scene, 0, "pack.cut.radius", err, "no grain has its centre within %g m of (%g, %g) m", radius, x,
-                       y);
+  if (pack->cut_shape == TAL_CUT_POLYGON)
+    return tal_pack_fail(scene, 0, "pack.cut.points", err,
+                         "no grain has its centre inside the polygon about (%g, %g) m", x, y);
+  return tal_pack_fail(scene, 0, "pack.cut.radius", err, "no grain has its centre within %g m of (%g, %g) m",
+                       pack->cut_radius, x, y);
 }
 
 tal_status tal_pack(const tal_scene *scene, tal_packing *packing, tal_error *err) {
@@ -159,7 +178,7 @@ tal_status tal_pack(const tal_scene *scene, tal_packing *packing, tal_error *err
     return tal_pack_fail(scene, 0, "pack.method", err, "unknown method '%s'", scene->pack.method);
   tal_status status = packer->pack(scene, packing, err);
   if (!status)
-    status = cut_circle(scene, packing, err);
+    status = cut(scene, packing, err);
   if (status) {
     tal_packing_clear(packing);
     return status;

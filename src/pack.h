@@ -29,8 +29,8 @@ const tal_packer *tal_packer_find(const char *name);
 // Runs the scene's packer, applies the cut, fills the report. Errors: TAL_BAD_INPUT with one sentence starting
 // "FILE:LINE: key: " (line 0 is left out); what is wrong in a CSV file starts with that file's path and line.
 // Ids are in packing order: order of the drops, of the list or file, lattice row by row from the bottom.
-// A cut keeps the grains whose centre lies within cut_radius of the middle of the bounding box of all discs, and
-// renumbers them in order. Random radii and drop places come from two streams of the scene's seed (random.h).
+// A cut keeps the grains whose centre lies in a circle or a polygon about the middle of the bounding box of all discs,
+// and renumbers them in order. Random radii and drop places come from two streams of the scene's seed (random.h).
 // Lengths scaled by a power of four give the same bits scaled.
 tal_status tal_pack(const tal_scene *scene, tal_packing *packing, tal_error *err);
 void tal_packing_clear(tal_packing *packing);

@@ -1,6 +1,7 @@
 #include "plates.h"
 
 #include "effects.h"
+#include "energy.h"
 #include "law.h"
 
 #include <math.h>
@@ -81,4 +82,22 @@ void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit) {
   const double parting = parting_speed(sim), line = pressure * sim->constants.thickness;
   for (int side = 1; side >= -1; side -= 2)
     servo(sim, side, line * width_at_plate(sim, side), parting, speed_limit);
+}
+
+void tal_plates_remove(tal_sim *sim) {
+  const tal_contacts *slots = &sim->wall_contacts;
+  for (size_t c = 0; c < slots->count; c++) {
+    tal_wall *wall = &sim->walls.wall[slots->j[c]];
+    if (wall->plate != 0)
+      wall->work -= tal_energy_normal(sim, slots, c);
+  }
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    tal_wall *wall = &sim->walls.wall[w];
+    if (wall->plate == 0)
+      continue;
+    wall->plate = 0;
+    wall->until_time = wall->from_time;
+    wall->listed = 0; // its energy is booked
+    wall->vx = wall->vy = wall->fx = wall->fy = 0;
+  }
 }

@@ -15,6 +15,7 @@ size_t tal_normal_law_choices(tal_choice *out, size_t capacity);     // law.c
 size_t tal_tangential_law_choices(tal_choice *out, size_t capacity); // law.c
 size_t tal_integrator_choices(tal_choice *out, size_t capacity);     // integrate.c
 size_t tal_boundary_choices(tal_choice *out, size_t capacity);       // boundary.c
+size_t tal_method_choices(tal_choice *out, size_t capacity);         // boundary.c
 size_t tal_stage_choices(tal_choice *out, size_t capacity);          // stage.c
 size_t tal_packer_choices(tal_choice *out, size_t capacity);         // pack.c
 

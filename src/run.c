@@ -63,7 +63,7 @@ typedef struct job {
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-enum { WARNINGS = 2, WARNING_SIZE = 200 };
+enum { WARNINGS = 3, WARNING_SIZE = 200 };
 
 // What the user should know about the accuracy of this run; count of sentences in `text`.
 static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
@@ -78,6 +78,11 @@ static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
     snprintf(text[count++], WARNING_SIZE,
              "phi reached %.3g: above %g the deformation is not quasi-static; lower mass_scaling or rate", this->phi,
              TAL_QUASISTATIC_LIMIT);
+  if (this->sim->run.outside_most > 0)
+    snprintf(
+        text[count++], WARNING_SIZE,
+        "up to %lld grains at a time lay outside the boundary: nothing pressed on them until it reached them again",
+        (long long)this->sim->run.outside_most);
   return count;
 }
 
@@ -85,7 +90,7 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
   char text[WARNINGS][WARNING_SIZE];
-  const char *const sentences[WARNINGS] = {text[0], text[1]};
+  const char *const sentences[WARNINGS] = {text[0], text[1], text[2]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
@@ -153,11 +158,11 @@ static bool due(const tal_sim *sim, double every) {
 // compressed as it was made bears no stress at first.
 static double phi_now(const job *this) {
   const tal_scene_stage *plan = tal_sim_stage(this->sim);
-  if (!plan || !(plan->rate > 0))
+  if (!plan || !(fabs(plan->rate) > 0))
     return 0;
   double height = 2 * this->sim->constants.mean_radius / this->row.psi;
   double pressure = fmax(0.5 * (this->row.sigma_xx + this->row.sigma_yy), plan->pressure);
-  return tal_quasistatic_coefficient(this->sim, plan->rate, pressure, height);
+  return tal_quasistatic_coefficient(this->sim, fabs(plan->rate), pressure, height);
 }
 
 static tal_status write_row(job *this, bool fields, tal_error *err) {

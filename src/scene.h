@@ -64,14 +64,19 @@ typedef struct tal_scene_wall {
 
 typedef enum tal_lattice { TAL_LATTICE_TRIANGULAR, TAL_LATTICE_SQUARE } tal_lattice;
 
+typedef enum tal_cut { TAL_CUT_CIRCLE, TAL_CUT_POLYGON } tal_cut;
+
 typedef struct tal_scene_pack {
-  const char *method;    // name of a registered packer: drop_and_roll, lattice, file, none
-  double width;          // [m] drop_and_roll
-  char *path;            // file: owned, as given (relative to the scene file's folder)
-  tal_lattice pattern;   // lattice
-  int64_t columns, rows; // lattice
-  double gap;            // [m] lattice: between neighbours, negative = overlap
-  double cut_radius;     // [m] cut: {shape: circle, radius:}, NAN: no cut
+  const char *method;      // name of a registered packer: drop_and_roll, lattice, file, none
+  double width;            // [m] drop_and_roll
+  char *path;              // file: owned, as given (relative to the scene file's folder)
+  tal_lattice pattern;     // lattice
+  int64_t columns, rows;   // lattice
+  double gap;              // [m] lattice: between neighbours, negative = overlap
+  tal_cut cut_shape;       // cut
+  double cut_radius;       // [m] circle: radius; polygon: of its furthest corner (by the loader); NAN: no cut
+  double (*cut_points)[2]; // polygon: owned; [cut_point_count][2] corners from the middle of the packing's box [m]
+  size_t cut_point_count;
 } tal_scene_pack;
 
 typedef struct tal_scene_continuum {
@@ -92,18 +97,44 @@ typedef struct tal_scene_integrator {
   double tolerance;   // implicit_friction: sweeps again while a force changes by more than this share of mu fn
 } tal_scene_integrator;
 
+// Components of the velocity gradient dv_a/dx_b [1/s]; NAN: not imposed.
+typedef struct tal_scene_rates {
+  double xx, yy, xy, yx;
+} tal_scene_rates;
+
+// Stresses [Pa], compression positive; NAN: not given.
+typedef struct tal_scene_stresses {
+  double xx, yy, xy;
+} tal_scene_stresses;
+
+// Bead chains of boundary: membrane.
+typedef struct tal_scene_membrane {
+  double stiffness; // [N/m] of a link
+  double prestress; // [N] tension of the links while they are a straight line
+  double radius;    // [m] of a bead, NAN: 1.25 mean radii
+  double mass;      // [kg] of a bead, NAN: that of a grain of its radius
+  double damping;   // [-] of a link, share of critical
+} tal_scene_membrane;
+
 typedef struct tal_scene_stage {
-  const char *kind;                // name of a registered stage: free, confine, compress
-  const char *boundary;            // compress: name of a registered boundary
-  double duration;                 // [s] free
-  double pressure;                 // [Pa] confine, compress (NAN: inherited from confine; resolved by the loader)
+  const char *kind;                // name of a registered stage: free, confine, compress, shear, deform
+  const char *boundary;            // name of a registered boundary (shear, deform: minimal; resolved by the loader)
+  const char *method;              // minimal: exact | penalty; else NULL
+  double penalty;                  // [N m s] minimal, penalty: K, NAN: from the explicit limit
+  int64_t order;                   // minimal, exact: p; else -1
+  double duration;                 // [s] free, deform
+  double pressure;                 // [Pa] all but free (NAN: inherited from confine; resolved by the loader)
   double ramp;                     // [s] confine
   double friction;                 // [-] confine; NAN: the material's
+  double plate_friction;           // [-] confine, compress: of the plates; NAN: that of the grains in this stage
   double tolerance;                // [-] confine: on the stresses, default 0.01
   double unbalanced;               // [-] confine: mean unbalanced over mean contact force, default 1e-3
   double timeout;                  // [s] confine: fails after this long, default 20 ramp + 20 s
-  double rate;                     // [1/s] compress
-  double strain;                   // [-] compress
+  double rate;                     // [1/s] compress, shear (may be negative); deform: largest of rates, by the loader
+  double strain;                   // [-] compress, shear
+  tal_scene_membrane membrane;     // compress with boundary: membrane
+  tal_scene_rates rates;           // deform
+  tal_scene_stresses stresses;     // deform
   tal_scene_integrator integrator; // the stage's own, else a copy of the scene's
   int line;                        // of the stage in the file, for messages
 } tal_scene_stage;
@@ -132,6 +163,7 @@ typedef struct tal_scene {
   tal_scene_continuum continuum;
   double skin;          // neighbours.skin [mean diameters]
   double overlap_limit; // limits.overlap [smaller radius]: beyond it the run stops
+  double outside_limit; // limits.outside [grains]: with more of them outside a minimal boundary the run stops
   tal_scene_integrator integrator;
   tal_scene_stage *stages; // owned
   size_t stage_count;

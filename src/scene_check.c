@@ -6,6 +6,7 @@
 #include "scene_value.h"
 
 #include <math.h>
+#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -192,9 +193,11 @@ static void check_tracks(const checker *c) {
 
 // A stage of unknown kind may have one.
 static bool has_rate(const tal_scene *scene) {
-  for (size_t s = 0; s < scene->stage_count; s++)
-    if (!scene->stages[s].kind || named(scene->stages[s].kind, "compress"))
+  for (size_t s = 0; s < scene->stage_count; s++) {
+    const tal_scene_stage *stage = &scene->stages[s];
+    if (!stage->kind || named(stage->kind, "compress") || named(stage->kind, "shear") || stage->rate > 0)
       return true;
+  }
   return false;
 }
 
@@ -295,6 +298,87 @@ static void check_cycles(const checker *c) {
   }
 }
 
+// ---- boundaries ----
+
+typedef struct stage_place {
+  const checker *c;
+  const tal_node *node;
+  size_t index;
+} stage_place;
+
+__attribute__((format(printf, 3, 4))) static void wrong_stage(const stage_place *at, const char *key,
+                                                              const char *format, ...) {
+  char path[80], text[300];
+  const tal_node *node = tal_node_find((tal_node *)at->node, key);
+  snprintf(path, sizeof path, "stages[%zu].%s", at->index, key);
+  va_list arguments;
+  va_start(arguments, format);
+  vsnprintf(text, sizeof text, format, arguments);
+  va_end(arguments);
+  tal_report_add(at->c->report, node ? node : at->node, path, "%s", text);
+}
+
+// Keys of minimal boundaries beside another one; keys of one method beside the other.
+static void check_method(const stage_place *at, const tal_scene_stage *stage) {
+  static const char *const keys[] = {"method", "penalty", "order"};
+  bool minimal = named(stage->boundary, "minimal"), exact = named(stage->method, "exact");
+  for (int k = 0; k < 3 && stage->boundary && !minimal; k++)
+    if (tal_node_get(at->node, keys[k]))
+      wrong_stage(at, keys[k], "has no effect with boundary: %s; accepted: only with boundary: minimal",
+                  stage->boundary);
+  if (stage->boundary && !named(stage->boundary, "membrane") && tal_node_get(at->node, "membrane"))
+    wrong_stage(at, "membrane", "has no effect with boundary: %s; accepted: only with boundary: membrane",
+                stage->boundary);
+  if (minimal && tal_node_get(at->node, "plate_friction"))
+    wrong_stage(at, "plate_friction", "has no effect with boundary: minimal; accepted: only with plates");
+  if (!minimal || !stage->method)
+    return;
+  if (exact && tal_node_get(at->node, "penalty"))
+    wrong_stage(at, "penalty", "has no effect with method: exact; accepted: only with method: penalty");
+  if (!exact && tal_node_get(at->node, "order"))
+    wrong_stage(at, "order", "has no effect with method: penalty; accepted: only with method: exact");
+}
+
+// A component is imposed or left to a stress, not both.
+static void check_components(const stage_place *at) {
+  static const char *const pairs[][2] = {{"rates.xx", "stresses.xx"},
+                                         {"rates.yy", "stresses.yy"},
+                                         {"rates.xy", "stresses.xy"},
+                                         {"rates.yx", "stresses.xy"}};
+  for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++)
+    if (tal_node_find((tal_node *)at->node, pairs[k][0]) && tal_node_find((tal_node *)at->node, pairs[k][1]))
+      wrong_stage(at, pairs[k][1], "stands beside %s; accepted: one of the two", pairs[k][0]);
+}
+
+static void check_boundaries(const checker *c) {
+  const tal_node *list = tal_node_get(c->root, "stages");
+  const tal_node *node = list ? list->child : NULL;
+  for (size_t s = 0; s < c->scene->stage_count; s++, node = node->next) {
+    const tal_scene_stage *stage = &c->scene->stages[s];
+    const stage_place at = {c, node, s};
+    if (node->kind != TAL_NODE_MAP)
+      continue;
+    check_method(&at, stage);
+    if (named(stage->kind, "deform"))
+      check_components(&at);
+    if (named(stage->kind, "shear") && stage->rate == 0)
+      wrong_stage(&at, "rate", "is zero; accepted: a number in 1/s that is not 0");
+  }
+}
+
+static void check_cut(const checker *c) {
+  const tal_scene_pack *pack = &c->scene->pack;
+  if (pack->cut_shape != TAL_CUT_POLYGON || pack->cut_point_count < 3)
+    return;
+  double twice = 0;
+  for (size_t k = 0; k < pack->cut_point_count; k++) {
+    const double *a = pack->cut_points[k], *b = pack->cut_points[(k + 1) % pack->cut_point_count];
+    twice += a[0] * b[1] - a[1] * b[0];
+  }
+  if (twice == 0)
+    wrong(c, "pack.cut.points", "enclose no area; accepted: corners of a polygon in order");
+}
+
 static void check_refresh(const checker *c) {
   const tal_node *refresh = tal_node_find(c->root, "continuum.refresh");
   if (refresh && refresh->kind == TAL_NODE_MAP && refresh->count != 1)
@@ -315,4 +399,6 @@ void tal_scene_check(const tal_scene *scene, tal_node *root, tal_report *report)
   check_walls(&c);
   check_refresh(&c);
   check_cycles(&c);
+  check_cut(&c);
+  check_boundaries(&c);
 }

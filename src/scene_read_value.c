@@ -192,7 +192,11 @@ static void read_wholes(tal_report *report, const tal_key *key, const tal_node *
 }
 
 static void read_pairs(tal_report *report, const tal_key *key, const tal_node *node, const tal_trail *at, char *base) {
-  static const tal_key pair = {.name = "", .type = TAL_KEY_VECTOR, .unit = "m and percent", .low = 0, .high = HUGE_VAL};
+  const tal_key pair = {.name = "",
+                        .type = TAL_KEY_VECTOR,
+                        .unit = key->unit ? key->unit : "m and percent",
+                        .low = key->unit ? -HUGE_VAL : 0,
+                        .high = HUGE_VAL};
   if (!tal_list_length_good(report, key, node, at))
     return;
   double(*values)[2] = tal_alloc(node->count, sizeof *values);

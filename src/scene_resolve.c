@@ -21,7 +21,7 @@ bool tal_scene_any_friction(const tal_scene *scene) {
   for (size_t w = 0; w < scene->wall_count; w++)
     any = any || scene->walls[w].friction > 0;
   for (size_t s = 0; s < scene->stage_count; s++)
-    any = any || scene->stages[s].friction > 0;
+    any = any || scene->stages[s].friction > 0 || scene->stages[s].plate_friction > 0;
   return any;
 }
 
@@ -74,6 +74,37 @@ static void resolve_stage_integrator(const tal_scene *scene, tal_scene_stage *st
     stage->integrator.tolerance = own.tolerance;
 }
 
+// A polygon reaches as far as its furthest corner.
+static void resolve_cut(tal_scene *scene) {
+  tal_scene_pack *pack = &scene->pack;
+  for (size_t k = 0; pack->cut_shape == TAL_CUT_POLYGON && k < pack->cut_point_count; k++)
+    pack->cut_radius = fmax(pack->cut_radius, hypot(pack->cut_points[k][0], pack->cut_points[k][1]));
+}
+
+// Shear and deform know no boundary but the minimal one; method and order belong to it.
+static void resolve_boundary(tal_scene_stage *stage, const tal_node *node) {
+  const char *kind = stage->kind ? stage->kind : "";
+  bool deforms = strcmp(kind, "shear") == 0 || strcmp(kind, "deform") == 0;
+  if (deforms)
+    stage->boundary = named("minimal", tal_boundary_choices);
+  const double none = nan("");
+  if (!stage->boundary || strcmp(stage->boundary, "membrane") != 0)
+    stage->membrane = (tal_scene_membrane){none, none, none, none, none};
+  bool minimal = stage->boundary && strcmp(stage->boundary, "minimal") == 0;
+  if (!minimal) {
+    stage->method = NULL;
+    stage->order = -1;
+    return;
+  }
+  if (!tal_node_get(node, "method"))
+    stage->method = named("exact", tal_method_choices);
+  if (!tal_node_get(node, "order"))
+    stage->order = strcmp(stage->method ? stage->method : "exact", "exact") == 0 ? 0 : -1;
+  const tal_scene_rates *rates = &stage->rates;
+  if (strcmp(kind, "deform") == 0)
+    stage->rate = fmax(fmax(fabs(rates->xx), fabs(rates->yy)), fmax(fabs(rates->xy), fabs(rates->yx)));
+}
+
 static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report) {
   const tal_node *list = tal_node_get(root, "stages");
   tal_node *node = list ? list->child : NULL;
@@ -90,7 +121,8 @@ static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report)
       if (!tal_node_get(node, "timeout"))
         stage->timeout = 20 * stage->ramp + 20;
     }
-    if (strcmp(kind, "compress") != 0 || tal_node_get(node, "pressure"))
+    resolve_boundary(stage, node);
+    if (!tal_word_among(kind, "compress shear deform") || tal_node_get(node, "pressure"))
       continue;
     stage->pressure = pressure;
     char key[64];
@@ -105,6 +137,7 @@ void tal_scene_resolve(tal_scene *scene, tal_node *root, tal_report *report) {
   resolve_tangential(scene, root);
   resolve_pack_method(scene, root);
   resolve_continuum(scene, root);
+  resolve_cut(scene);
   resolve_stages(scene, root, report);
   if (isnan(scene->contact.restitution))
     scene->contact.damping = isnan(scene->contact.damping) ? 0 : scene->contact.damping;

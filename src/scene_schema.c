@@ -2,6 +2,7 @@
 // at once is in scene_check.c.
 #include "scene_schema.h"
 
+#include "boundary_rows.h"
 #include "delaunay.h"
 
 #include <math.h>
@@ -38,7 +39,8 @@ FIXED_CHOICES(radius_choices, {"uniform", "every radius between min and max equa
 FIXED_CHOICES(lattice_choices, {"triangular", "six neighbours"}, {"square", "four neighbours"})
 FIXED_CHOICES(tessellation_choices, {"delaunay", "plain Delaunay triangulation of the centres"},
               {"power", "weighted by radius squared: touching disks always share an edge"})
-FIXED_CHOICES(cut_choices, {"circle", "grains whose centre lies inside a circle"})
+FIXED_CHOICES(cut_choices, {"circle", "grains whose centre lies inside a circle"},
+              {"polygon", "grains whose centre lies inside a polygon"})
 
 static size_t backend_choices(tal_choice *out, size_t capacity) {
   size_t count = 0;
@@ -148,11 +150,15 @@ static const tal_key wall_keys[] = {
      .help = "gone from this time on (a gate opens)"},
     {.name = NULL}};
 
-static const tal_key cut_keys[] = {
-    {KEY("shape", CHOICE), .fallback = "circle", CHOOSE(cut_choices), .help = "what is kept"},
-    {KEY("radius", REAL), .unit = "m", .required = true, POSITIVE, AT(tal_scene_pack, cut_radius),
-     .help = "of the circle"},
-    {.name = NULL}};
+static const tal_key cut_keys[] = {{KEY("shape", CHOICE), .fallback = "circle", CHOOSE(cut_choices),
+                                    AT(tal_scene_pack, cut_shape), .help = "what is kept"},
+                                   {KEY("radius", REAL), .unit = "m", ONLY("shape", "circle"), .required = true,
+                                    POSITIVE, AT(tal_scene_pack, cut_radius),
+                                    .help = "of the circle about the middle of the packing's box"},
+                                   {KEY("points", PAIRS), .unit = "m", ONLY("shape", "polygon"), .required = true,
+                                    FROM(3, 1000), COUNTED(tal_scene_pack, cut_points, cut_point_count),
+                                    .help = "corners [x, y] in order, from the middle of the packing's box"},
+                                   {.name = NULL}};
 
 static const tal_key pack_keys[] = {
     {KEY("method", CHOICE), .note = "drop_and_roll with count, none with list", CHOOSE(tal_packer_choices),
@@ -170,7 +176,7 @@ static const tal_key pack_keys[] = {
     {KEY("gap", REAL), .unit = "m", ONLY("method", "lattice"), .fallback = "0", ANY, AT(tal_scene_pack, gap),
      .help = "between neighbours; negative: overlap"},
     {KEY("cut", GROUP), .optional = true, .note = "none", .offset = 0, .size = sizeof(tal_scene_pack), .keys = cut_keys,
-     .help = "keeps only the grains inside"},
+     .help = "keeps only the grains inside; such a sample is confined without plates"},
     {.name = NULL}};
 
 static const tal_key refresh_keys[] = {
@@ -199,6 +205,8 @@ static const tal_key neighbours_keys[] = {
 static const tal_key limits_keys[] = {
     {KEY("overlap", REAL), .unit = "smaller radius", .fallback = "0.5", ABOVE_TO(0, 1), AT(tal_scene, overlap_limit),
      .help = "a deeper contact stops the run as invalid (exit 3), the last good checkpoint is kept"},
+    {KEY("outside", REAL), .unit = "grains", .fallback = "0.05", FROM(0, 1), AT(tal_scene, outside_limit),
+     .help = "a larger share of the grains outside a minimal boundary's loop stops the run as invalid"},
     {.name = NULL}};
 
 static const tal_key integrator_keys[] = {
@@ -240,10 +248,39 @@ static const tal_key stage_integrator_keys[] = {
      .help = "runs above the critical time step, at the user's risk"},
     {.name = NULL}};
 
+static const tal_key membrane_keys[] = {
+    {KEY("stiffness", REAL), .unit = "N/m", .fallback = "1e4", POSITIVE, AT(tal_scene_membrane, stiffness),
+     .help = "of a link against stretching [P: 10 N/mm]; a link shorter than at rest is slack"},
+    {KEY("prestress", REAL), .unit = "N", .fallback = "0", NOT_NEGATIVE, AT(tal_scene_membrane, prestress),
+     .help = "tension of a link before the membrane is laid; 0: it just fits the height of the sample"},
+    {KEY("radius", REAL), .unit = "m", .note = "1.25 mean radii", POSITIVE, AT(tal_scene_membrane, radius),
+     .help = "of a bead: larger than the grains, so that none slips through; links are two radii long"},
+    {KEY("mass", REAL), .unit = "kg", .note = "of a grain of that radius, scaled", POSITIVE,
+     AT(tal_scene_membrane, mass), .help = "of a bead"},
+    {KEY("damping", REAL), .fallback = "0.2", NOT_NEGATIVE, AT(tal_scene_membrane, damping),
+     .help = "of a link, as a share of critical"},
+    {.name = NULL}};
+
+static const tal_key rate_keys[] = {
+    {KEY("xx", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, xx), .help = "dvx/dx"},
+    {KEY("yy", REAL), .unit = "1/s", .note = "left to the stress", ANY, AT(tal_scene_rates, yy), .help = "dvy/dy"},
+    {KEY("xy", REAL), .unit = "1/s", .note = "0, unless stresses.xy is given", ANY, AT(tal_scene_rates, xy),
+     .help = "dvx/dy"},
+    {KEY("yx", REAL), .unit = "1/s", .note = "0, unless stresses.xy is given", ANY, AT(tal_scene_rates, yx),
+     .help = "dvy/dx"},
+    {.name = NULL}};
+
+static const tal_key stress_keys[] = {
+    {KEY("xx", REAL), .unit = "Pa", .note = "the pressure", ANY, AT(tal_scene_stresses, xx), .help = "on the sides"},
+    {KEY("yy", REAL), .unit = "Pa", .note = "the pressure", ANY, AT(tal_scene_stresses, yy),
+     .help = "on top and bottom"},
+    {KEY("xy", REAL), .unit = "Pa", .note = "shear is imposed", ANY, AT(tal_scene_stresses, xy), .help = "shear"},
+    {.name = NULL}};
+
 static const tal_key stage_keys[] = {
     {KEY("kind", CHOICE), .required = true, CHOOSE(tal_stage_choices), AT(tal_scene_stage, kind),
      .help = "what the stage does"},
-    {KEY("duration", REAL), .unit = "s", ONLY("kind", "free"), .required = true, POSITIVE,
+    {KEY("duration", REAL), .unit = "s", ONLY("kind", "free deform"), .required = true, POSITIVE,
      AT(tal_scene_stage, duration), .help = "ends after round(duration/dt) steps"},
     {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "confine"), .required = true, POSITIVE,
      AT(tal_scene_stage, pressure), .help = "isotropic pressure to reach"},
@@ -251,6 +288,8 @@ static const tal_key stage_keys[] = {
      .help = "time over which the pressure is raised"},
     {KEY("friction", REAL), ONLY("kind", "confine"), .note = "the material's", NOT_NEGATIVE,
      AT(tal_scene_stage, friction), .help = "between grains in this stage: low gives dense, high loose samples"},
+    {KEY("plate_friction", REAL), ONLY("kind", "confine compress"), .note = "that between grains in this stage",
+     NOT_NEGATIVE, AT(tal_scene_stage, plate_friction), .help = "between plates and grains"},
     {KEY("tolerance", REAL), ONLY("kind", "confine"), .fallback = "0.01", INSIDE(0, 1), AT(tal_scene_stage, tolerance),
      .help = "ends when both normal stresses are this close to the pressure (relative)"},
     {KEY("unbalanced", REAL), ONLY("kind", "confine"), .fallback = "1e-3", POSITIVE, AT(tal_scene_stage, unbalanced),
@@ -258,11 +297,30 @@ static const tal_key stage_keys[] = {
     {KEY("timeout", REAL), .unit = "s", ONLY("kind", "confine"), .note = "20 ramp + 20 s", POSITIVE,
      AT(tal_scene_stage, timeout), .help = "fails after this long, saying what was reached"},
     {KEY("boundary", CHOICE), ONLY("kind", "compress"), .fallback = "pressure", CHOOSE(tal_boundary_choices),
-     AT(tal_scene_stage, boundary), .help = "lateral boundary"},
-    {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "compress"), .note = "that of the last confine stage before",
-     POSITIVE, AT(tal_scene_stage, pressure), .help = "lateral pressure"},
+     AT(tal_scene_stage, boundary), .help = "lateral boundary, or minimal for no plates at all"},
+    {KEY("membrane", GROUP), ONLY("kind", "compress"), .optional = true, .note = "with boundary: membrane",
+     AT(tal_scene_stage, membrane), .keys = membrane_keys, .help = "the beads of boundary: membrane"},
+    {KEY("method", CHOICE), ONLY("kind", "compress shear deform"), .note = "exact with minimal boundaries",
+     CHOOSE(tal_method_choices), AT(tal_scene_stage, method), .help = "how minimal boundaries impose the strain rate"},
+    {KEY("penalty", REAL), .unit = "N m s", ONLY("kind", "compress shear deform"),
+     .note = "half the explicit limit when the stage begins", POSITIVE, AT(tal_scene_stage, penalty),
+     .help = "constant K of method: penalty; above the explicit limit the run stops"},
+    {KEY("order", WHOLE), ONLY("kind", "compress shear deform"), .note = "0 with minimal boundaries",
+     FROM(0, TAL_ORDER_MOST), AT(tal_scene_stage, order),
+     .help = "of minimal boundaries, method: exact: 0 uniform traction; higher orders hold the shape"},
+    {KEY("pressure", REAL), .unit = "Pa", ONLY("kind", "compress shear deform"),
+     .note = "that of the last confine stage before", POSITIVE, AT(tal_scene_stage, pressure),
+     .help = "lateral pressure; on all sides with minimal boundaries"},
     {KEY("rate", REAL), .unit = "1/s", ONLY("kind", "compress"), .required = true, POSITIVE, AT(tal_scene_stage, rate),
      .help = "rate of the engineering axial strain"},
+    {KEY("rate", REAL), .unit = "1/s", ONLY("kind", "shear"), .required = true, ANY, AT(tal_scene_stage, rate),
+     .help = "L_xy of simple shear; negative: the other way"},
+    {KEY("strain", REAL), ONLY("kind", "shear"), .required = true, POSITIVE, AT(tal_scene_stage, strain),
+     .help = "amount of shear strain that the stage adds, in the direction of the rate"},
+    {KEY("rates", GROUP), ONLY("kind", "deform"), .optional = true, .note = "none", AT(tal_scene_stage, rates),
+     .keys = rate_keys, .help = "imposed components of the mean velocity gradient"},
+    {KEY("stresses", GROUP), ONLY("kind", "deform"), .optional = true, .note = "the pressure",
+     AT(tal_scene_stage, stresses), .keys = stress_keys, .help = "stresses on the loop, compression positive"},
     {KEY("strain", REAL), ONLY("kind", "compress"), .required = true, INSIDE(0, 1), AT(tal_scene_stage, strain),
      .help = "engineering axial strain that the stage adds"},
     {KEY("integrator", GROUP), .optional = true, .note = "the scene's", AT(tal_scene_stage, integrator),

@@ -119,7 +119,7 @@ void tal_key_accepted(const tal_key *key, char *out, size_t size) {
     snprintf(out, size, "a list of whole numbers >= %g: [0, 1]", key->low);
     break;
   case TAL_KEY_PAIRS:
-    snprintf(out, size, "a list of at least %g pairs: [[diameter, percent], ...]", key->low);
+    snprintf(out, size, "a list of at least %g pairs: [[%s], ...]", key->low, key->unit ? "x, y" : "diameter, percent");
     break;
   case TAL_KEY_GROUP:
     accepted_group(key, "a mapping", out, size);

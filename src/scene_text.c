@@ -25,19 +25,21 @@ static const void *array_of(const tal_key *key, const char *base) {
 
 static bool is_set(const tal_key *key, const char *base);
 
-// An optional group is there when one of its required keys is (or when it has none).
+// An optional group is there when one of its required keys is; when it has none, when one of its keys is.
 static bool group_is_set(const tal_key *key, const char *base) {
-  bool any_required = false;
+  bool any_required = false, any_set = false;
   if (!key->optional)
     return true;
   for (const tal_key *inner = key->keys; inner->name; inner++) {
-    if (!inner->required || !tal_walk_exists(inner, key->keys, NULL, base))
+    if (!tal_walk_exists(inner, key->keys, NULL, base))
       continue;
-    if (is_set(inner, base))
+    bool set = is_set(inner, base);
+    if (set && inner->required)
       return true;
-    any_required = true;
+    any_required = any_required || inner->required;
+    any_set = any_set || set;
   }
-  return !any_required;
+  return !any_required && any_set;
 }
 
 static bool is_set(const tal_key *key, const char *base) {

@@ -1,6 +1,7 @@
 #include "sim.h"
 
 #include "boundary.h"
+#include "boundary_minimal.h"
 #include "critical.h"
 #include "damping.h"
 #include "effects.h"
@@ -26,8 +27,8 @@ static double plane_modulus(double young, double poisson) {
 // The rate that sets vR: of the first stage that has one, NAN without.
 static double first_rate(const tal_scene *scene) {
   for (size_t s = 0; s < scene->stage_count; s++)
-    if (scene->stages[s].rate > 0)
-      return scene->stages[s].rate;
+    if (fabs(scene->stages[s].rate) > 0)
+      return fabs(scene->stages[s].rate);
   return (double)NAN;
 }
 
@@ -170,6 +171,8 @@ void tal_sim_free(tal_sim *sim) {
   tal_walls_clear(&sim->walls);
   tal_neighbours_clear(&sim->neighbours);
   tal_implicit_clear(&sim->implicit);
+  tal_rows_clear(&sim->rows);
+  tal_membrane_clear(&sim->membrane);
   free(sim->grain_records);
   free(sim->force_records);
   free(sim->sums);
@@ -190,9 +193,9 @@ bool tal_sim_done(const tal_sim *sim) {
 }
 
 tal_observed tal_sim_observe(tal_sim *sim) {
+  tal_forces_see_now(sim);
   if (sim->boundary && sim->graph.valid)
     sim->boundary->apply(sim);
-  tal_forces_see_now(sim);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     tal_implicit_observe(sim);
   else
@@ -232,6 +235,26 @@ static double plate_load(const tal_sim *sim, int side) {
   return plate ? -side * plate->fy : (double)NAN;
 }
 
+static double plate_shear(const tal_sim *sim, int side) {
+  const tal_wall *plate = tal_walls_plate(&sim->walls, side);
+  return plate ? plate->fx : (double)NAN;
+}
+
+static void row_minimal(const tal_sim *sim, tal_row *row) {
+  const double none = (double)NAN, *multiplier = sim->rows.multiplier;
+  const bool minimal = sim->boundary == &tal_boundary_minimal;
+  geo_tensor error = minimal ? tal_minimal_error(sim) : (geo_tensor){none, none, none, none};
+  row->multiplier_xx = minimal ? multiplier[TAL_XX] : none;
+  row->multiplier_yy = minimal ? multiplier[TAL_YY] : none;
+  row->multiplier_xy = minimal ? multiplier[TAL_XY] : none;
+  row->multiplier_spin = minimal ? multiplier[TAL_SPIN] : none;
+  row->strain_rate_error_xx = error.xx;
+  row->strain_rate_error_yy = error.yy;
+  row->strain_rate_error_xy = error.xy;
+  row->boundary_rank = minimal ? (double)sim->rows.rank : none;
+  row->outside = sim->graph.valid ? (double)sim->graph.loop.outside_count : none;
+}
+
 static void row_macro(const tal_macro *macro, tal_row *row) {
   row->sigma_xx = macro->stress.xx;
   row->sigma_yy = macro->stress.yy;
@@ -265,13 +288,20 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   int64_t grain;
   *row = (tal_row){.time = run->time, .step = (double)run->step, .stage = (double)run->stage};
   row->axial_strain = run->axial_strain;
+  row->shear_strain = run->shear_strain;
   row->volumetric_strain = volumetric_strain(sim);
   row_macro(&macro, row);
+  row_minimal(sim, row);
   row->plate_bottom = plate_load(sim, +1);
   row->plate_top = plate_load(sim, -1);
+  row->plate_bottom_shear = plate_shear(sim, +1);
+  row->plate_top_shear = plate_shear(sim, -1);
+  row->membrane_tension = sim->membrane.count ? 0 : (double)NAN;
+  for (size_t b = 0; b < sim->membrane.count; b++)
+    row->membrane_tension = fmax(row->membrane_tension, sim->membrane.tension[b]);
   tal_energy_row(sim, row);
   row->dt_ratio = tal_step_longest(sim) / tal_critical_step(sim);
-  double rate = plan && plan->rate > 0 ? plan->rate : first_rate(sim->scene);
+  double rate = plan && fabs(plan->rate) > 0 ? fabs(plan->rate) : first_rate(sim->scene);
   row->phi = tal_quasistatic_coefficient(sim, rate, 0.5 * (row->sigma_xx + row->sigma_yy), macro.height);
   row->psi = 2 * sim->constants.mean_radius / macro.height;
   row->overlap_max = tal_largest_overlap(sim, &grain);
@@ -288,6 +318,8 @@ void tal_sim_restored(tal_sim *sim) {
     if (plan->pressure > 0)
       sim->boundary = tal_boundary_find(plan->boundary ? plan->boundary : "pressure");
   }
+  if (sim->boundary && sim->boundary->restored)
+    sim->boundary->restored(sim);
   tal_step_effects(sim);
   tal_neighbours_restore(sim);
   tal_sim_observe(sim); // overlaps: a wall that vanishes in the next step takes its contacts' energy along

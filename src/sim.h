@@ -2,10 +2,12 @@
 #ifndef TAL_SIM_H
 #define TAL_SIM_H
 
+#include "boundary_rows.h"
 #include "contacts.h"
 #include "continuum.h"
 #include "grains.h"
 #include "implicit.h"
+#include "membrane.h"
 #include "neighbours.h"
 #include "pack.h"
 #include "records.h"
@@ -29,6 +31,27 @@
   X(double, log_volume, "1", "log of the area ratio over the finished refresh intervals since the first compress")     \
   X(double, height0, "m", "distance of the plates when the first compress began")                                      \
   X(double, axial_strain, "1", "engineering axial strain, compression positive")                                       \
+  X(double, shear_strain, "1", "time integral of L_xy + L_yx of the loop under minimal boundaries")                    \
+  X(double, axial_start, "1", "axial strain when this stage began")                                                    \
+  X(double, gradient_xx, "1/s", "mean velocity gradient of the loop in the coming step (minimal boundaries)")          \
+  X(double, gradient_xy, "1/s", "mean velocity gradient of the loop in the coming step")                               \
+  X(double, gradient_yx, "1/s", "mean velocity gradient of the loop in the coming step")                               \
+  X(double, gradient_yy, "1/s", "mean velocity gradient of the loop in the coming step")                               \
+  X(double, penalty, "N m s", "penalty constant of minimal boundaries")                                                \
+  X(double, correcting_power, "W", "power of the forces that correct the mean velocity gradient")                      \
+  X(double, correcting_work, "J", "work of the forces that correct the mean velocity gradient")                        \
+  X(int64_t, unsolvable, "1", "1 when the mean velocity gradient could not be imposed")                                \
+  X(double, membrane_pressure_power, "W", "of the pressure on the membrane's links")                                   \
+  X(double, membrane_pressure_work, "J", "of the pressure on the membrane's links")                                    \
+  X(double, membrane_ends_power, "W", "of the plates on the membrane's ends")                                          \
+  X(double, membrane_ends_work, "J", "of the plates on the membrane's ends")                                           \
+  X(double, membrane_grains_power, "W", "of the membrane on the grains")                                               \
+  X(double, membrane_grains_work, "J", "of the membrane on the grains")                                                \
+  X(double, membrane_lost_power, "W", "lost in the membrane and its contacts to viscosity")                            \
+  X(double, membrane_lost_work, "J", "lost in the membrane and its contacts to viscosity")                             \
+  X(double, membrane_brought, "J", "energy of membranes laid, less that of membranes taken away")                      \
+  X(int64_t, outside_most, "1", "most grains outside the loop since the first boundary acted")                         \
+  X(double, refresh_shear, "1", "shear strain at the last refresh")                                                    \
   X(double, pressure, "Pa", "pressure applied now on the loop")                                                        \
   X(double, impulse_time, "s", "start of the window over which mean forces are taken")                                 \
   X(int64_t, arc_bottom_left, "1", "place on the loop where the left arc ends")                                        \
@@ -74,6 +97,19 @@ typedef struct tal_run {
   X(fabric_yy, "", "contact fabric")                                                                                   \
   X(mean_slip, "", "mean slip speed of touching pairs over vR")                                                        \
   X(unbalanced, "", "mean unbalanced force over mean contact force")                                                   \
+  X(shear_strain, "", "integral of L_xy + L_yx under minimal boundaries")                                              \
+  X(multiplier_xx, "Pa", "stress by which minimal boundaries correct the imposed strain rate, beside the pressure")    \
+  X(multiplier_yy, "Pa", "the same")                                                                                   \
+  X(multiplier_xy, "Pa", "the same")                                                                                   \
+  X(multiplier_spin, "Pa", "couple that holds the mean spin, as the antisymmetric stress yx - xy it is half of")       \
+  X(strain_rate_error_xx, "1/s", "mean velocity gradient that moves the grains less the imposed one, extension +")     \
+  X(strain_rate_error_yy, "1/s", "the same")                                                                           \
+  X(strain_rate_error_xy, "1/s", "the same, symmetric part")                                                           \
+  X(boundary_rank, "", "stress fields beyond the uniform ones that hold the shape (minimal, order > 0)")               \
+  X(outside, "", "grains outside the loop")                                                                            \
+  X(plate_bottom_shear, "N", "horizontal force of the grains on the bottom plate")                                     \
+  X(plate_top_shear, "N", "horizontal force of the grains on the top plate")                                           \
+  X(membrane_tension, "N", "largest tension in a link of the membrane")                                                \
   X(plate_bottom, "N", "force of the grains on the bottom plate, compression positive")                                \
   X(plate_top, "N", "force of the grains on the top plate, compression positive")                                      \
   X(kinetic, "J", "kinetic energy")                                                                                    \
@@ -81,6 +117,8 @@ typedef struct tal_run {
   X(gravity, "J", "potential energy of gravity")                                                                       \
   X(work_walls, "J", "work done by plates and walls")                                                                  \
   X(work_pressure, "J", "work done by the pressure on the loop")                                                       \
+  X(work_minimal, "J", "work done by the forces that impose the strain rate (minimal)")                                \
+  X(work_membrane, "J", "energy that membranes brought when laid, less what they took along")                          \
   X(work_held, "J", "work done by what holds fixed grains and held spins")                                             \
   X(dissipated_friction, "J", "energy lost to friction")                                                               \
   X(dissipated_damping, "J", "energy lost to the viscous normal force")                                                \
@@ -134,6 +172,8 @@ struct tal_sim {
   tal_neighbours neighbours;
   tal_implicit implicit; // scratch of friction and damping solved implicitly
   tal_graph graph;
+  tal_membrane membrane;
+  tal_rows rows; // of a minimal boundary
   tal_run run;
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
   const tal_boundary *boundary; // what presses the loop now, NULL: nothing

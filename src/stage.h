@@ -2,6 +2,7 @@
 #ifndef TAL_STAGE_H
 #define TAL_STAGE_H
 
+#include "boundary_minimal.h"
 #include "registry.h"
 #include "sim.h"
 
@@ -17,10 +18,12 @@ struct tal_stage {
   void (*before_step)(tal_sim *sim, const tal_scene_stage *plan);
   // After each step (and once after begin): sets run.stage_done, or fails with what was reached.
   tal_status (*after_step)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
+  // What the stage asks of a minimal boundary at run.time, into a zeroed target; NULL: it knows none.
+  void (*target)(const tal_sim *sim, const tal_scene_stage *plan, tal_boundary_target *target);
 };
 
 const tal_stage *tal_stage_find(const char *name);
 
-extern const tal_stage tal_stage_free, tal_stage_confine, tal_stage_compress;
+extern const tal_stage tal_stage_free, tal_stage_confine, tal_stage_compress, tal_stage_shear, tal_stage_deform;
 
 #endif

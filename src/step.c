@@ -85,7 +85,7 @@ static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
   sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
   for (size_t w = 0; w < sim->walls.count; w++)
     if (sim->walls.wall[w].plate != 0)
-      sim->walls.wall[w].friction = sim->friction;
+      sim->walls.wall[w].friction = isnan(plan->plate_friction) ? sim->friction : plan->plate_friction;
 }
 
 // The same in small steps.
@@ -108,6 +108,11 @@ double tal_step_longest(const tal_sim *sim) {
 }
 
 static tal_status check_step(const tal_sim *sim, tal_error *err) {
+  if (sim->boundary && sim->boundary->check) {
+    tal_status status = sim->boundary->check(sim, err);
+    if (status)
+      return status;
+  }
   const tal_scene_stage *plan = tal_sim_stage(sim);
   double critical = tal_critical_step(sim);
   double longest = tal_step_longest(sim);
@@ -139,9 +144,12 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   run->stage_start = run->time;
   run->stage_done = 0;
   run->stage_begun = 1;
+  run->correcting_power = 0;
   tal_status status = sim->stage->begin(sim, plan, err);
   if (status)
     return status;
+  if (sim->membrane.count && sim->boundary != &tal_boundary_membrane)
+    tal_membrane_remove(sim);
   set_friction(sim, plan);
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);
@@ -149,6 +157,14 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   if (tal_step_keeps_graph(sim) && (status = tal_step_refresh(sim, err)))
     return status;
   tal_sim_observe(sim);
+  if (sim->boundary && sim->boundary->start) {
+    sim->boundary->start(sim);
+    tal_sim_observe(sim);
+  }
+  if (sim->boundary && sim->boundary->constrain) {
+    sim->boundary->constrain(sim, 0, 0.5 * sim->dt);
+    tal_sim_driving(sim);
+  }
   tal_walls_take_loads(sim, 0);
   tal_energy_credit(sim, 0.5 * sim->dt);
   drive_with_observed(sim);
@@ -176,8 +192,12 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   run->refresh_area = geo_loop_area(&sim->graph.loop, g->x, g->y);
   run->refresh_step = run->step;
   run->refresh_strain = run->axial_strain;
-  if (sim->boundary)
-    sim->boundary->refreshed(sim);
+  run->refresh_shear = run->shear_strain;
+  if (!sim->boundary)
+    return TAL_OK;
+  const int64_t outside = (int64_t)sim->graph.loop.outside_count;
+  run->outside_most = outside > run->outside_most ? outside : run->outside_most;
+  sim->boundary->refreshed(sim);
   return TAL_OK;
 }
 
@@ -196,7 +216,9 @@ static bool refresh_due(const tal_sim *sim) {
   int64_t steps = sim->run.step - sim->run.refresh_step;
   if (plan->refresh_steps > 0)
     return steps >= plan->refresh_steps;
-  if (!isnan(plan->refresh_strain) && sim->run.axial_strain - sim->run.refresh_strain >= plan->refresh_strain)
+  double strained =
+      fmax(fabs(sim->run.axial_strain - sim->run.refresh_strain), fabs(sim->run.shear_strain - sim->run.refresh_shear));
+  if (!isnan(plan->refresh_strain) && strained >= plan->refresh_strain)
     return true;
   // displacement is looked at every tenth step only; with a strain it is the confinement's criterion
   double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;

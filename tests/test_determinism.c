@@ -73,7 +73,7 @@ static void put_vector(FILE *to, units u, const char *key, double x, double y, c
 }
 
 // Drop-and-roll, confinement with its own friction and step, compression.
-static void biaxial(FILE *to, units u, const char *tangential) {
+static void biaxial(FILE *to, units u, const char *tangential, const char *boundary) {
   fputs("grains: {count: 120, ", to);
   put(to, u, "thickness", 1.5e-3, "m");
   fputs(", radius: ", to);
@@ -91,16 +91,25 @@ static void biaxial(FILE *to, units u, const char *tangential) {
            2e-5 * factor("s", u));
   MAP(to, u, more, {"pressure", 1e5, "Pa"}, {"ramp", 0.04, "s"});
   fputs("\n  - ", to);
-  MAP(to, u, ", kind: compress, strain: 0.003", {"rate", 0.1, "1/s"});
+  snprintf(more, sizeof more, ", kind: compress, strain: 0.003, boundary: %s", boundary);
+  MAP(to, u, more, {"rate", 0.1, "1/s"});
   fputs("\n", to);
 }
 
 static void biaxial_regularised(FILE *to, units u) {
-  biaxial(to, u, "regularised");
+  biaxial(to, u, "regularised", "pressure");
 }
 
 static void biaxial_spring(FILE *to, units u) {
-  biaxial(to, u, "spring");
+  biaxial(to, u, "spring", "pressure");
+}
+
+static void biaxial_exact(FILE *to, units u) {
+  biaxial(to, u, "spring", "minimal, order: 2");
+}
+
+static void biaxial_penalty(FILE *to, units u) {
+  biaxial(to, u, "regularised", "minimal, method: penalty");
 }
 
 // Listed grains, spheres, linear law with restitution, springs, walls, gravity, a fixed grain, own mass and inertia.
@@ -174,7 +183,7 @@ static size_t run_rows(engine *e, tal_row rows[ROWS]) {
 // EXACT: other units of length (powers of four), time and mass (powers of two) change no bit but the exponents.
 static void other_units(void **state) {
   (void)state;
-  static writer *const scenes[] = {biaxial_regularised, biaxial_spring, listed};
+  static writer *const scenes[] = {biaxial_regularised, biaxial_spring, biaxial_exact, biaxial_penalty, listed};
   static const units to[] = {{2, 0, 0}, {-4, 3, 5}, {10, -7, -3}};
   for (size_t s = 0; s < sizeof scenes / sizeof *scenes; s++) {
     tal_row plain[ROWS], scaled[ROWS];

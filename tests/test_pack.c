@@ -472,6 +472,49 @@ static void cut_keeps_circle(void **state) {
   tal_packing_clear(&cut);
 }
 
+// EXACT: a polygon, corners from the middle of the box, given either way round: a triangle against its three half
+// planes and a notch, which is no half plane.
+static void cut_keeps_polygon(void **state) {
+  (void)state;
+  tal_scene scene = box_scene(2000, 40e-3, 2);
+  tal_packing whole = packed(&scene);
+  double x0 = 1, x1 = 0, y0 = 1, y1 = 0;
+  for (size_t i = 0; i < whole.count; i++) {
+    x0 = fmin(x0, whole.x[i] - whole.r[i]);
+    x1 = fmax(x1, whole.x[i] + whole.r[i]);
+    y0 = fmin(y0, whole.y[i] - whole.r[i]);
+    y1 = fmax(y1, whole.y[i] + whole.r[i]);
+  }
+  double triangle[3][2] = {{-10e-3, -8e-3}, {12e-3, -6e-3}, {1e-3, 14e-3}}, back[3][2];
+  double notched[5][2] = {{-9e-3, -9e-3}, {9e-3, -9e-3}, {9e-3, 9e-3}, {0, 0}, {-9e-3, 9e-3}};
+  for (int k = 0; k < 3; k++)
+    memcpy(back[k], triangle[2 - k], sizeof back[k]);
+  for (int shape = 0; shape < 3; shape++) {
+    scene.pack.cut_shape = TAL_CUT_POLYGON;
+    scene.pack.cut_points = shape == 0 ? triangle : shape == 1 ? back : notched;
+    scene.pack.cut_point_count = shape < 2 ? 3 : 5;
+    scene.pack.cut_radius = 1; // given
+    tal_packing cut = packed(&scene);
+    size_t kept = 0;
+    for (size_t i = 0; i < whole.count; i++) {
+      double x = whole.x[i] - (x0 + x1) / 2, y = whole.y[i] - (y0 + y1) / 2;
+      bool inside = fabs(x) < 9e-3 && y > -9e-3 && y < fabs(x);
+      for (int k = 0; shape < 2 && k < 3; k++) {
+        const double *a = triangle[k], *b = triangle[(k + 1) % 3];
+        inside = (k == 0 || inside) && (b[0] - a[0]) * (y - a[1]) - (b[1] - a[1]) * (x - a[0]) > 0;
+      }
+      if (!inside)
+        continue;
+      assert_true(kept < cut.count && cut.x[kept] == whole.x[i] && cut.y[kept] == whole.y[i]);
+      kept++;
+    }
+    assert_true(kept > 50);
+    assert_int_equal(kept, cut.count);
+    tal_packing_clear(&cut);
+  }
+  tal_packing_clear(&whole);
+}
+
 // ROUND: closed forms of mass and inertia for both shapes, scaling; overrides as given; fixed grains and held spins.
 static void grains_from_packing(void **state) {
   (void)state;
@@ -577,6 +620,7 @@ int main(void) {
       cmocka_unit_test(same_bits),
       cmocka_unit_test(lattices_closed_form),
       cmocka_unit_test(cut_keeps_circle),
+      cmocka_unit_test(cut_keeps_polygon),
       cmocka_unit_test(grains_from_packing),
       cmocka_unit_test(refuses),
       cmocka_unit_test(registry),

@@ -477,7 +477,7 @@ static void test_keys(void **state) {
   (void)state;
   static const struct {
     const char *what, *has, *has_not;
-  } rows[] = {{"", "material.young", "penalty"},
+  } rows[] = {{"", "material.young", "viscosity"},
               {"stages.compress", "stages.rate", "stages.duration"},
               {"stages.free", "stages.duration", "stages.rate"},
               {"stages[1].rate", "only with kind: compress", "stages.strain"},
@@ -517,7 +517,7 @@ static void test_json_schema(void **state) {
   tal_node *young = tal_node_find(root, "properties.material.properties.young");
   assert_string_equal(tal_node_find(young, "exclusiveMinimum")->text, "0");
   assert_string_equal(tal_node_find(root, "properties.seed.default")->text, "1");
-  assert_int_equal(tal_node_find(root, "properties.stages.items.allOf")->count, 3);
+  assert_int_equal(tal_node_find(root, "properties.stages.items.allOf")->count, 5);
   assert_int_equal(tal_node_find(root, "properties.walls.items.required")->count, 2);
   tal_tree_clear(&tree);
   free(text);

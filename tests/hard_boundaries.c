@@ -1,0 +1,305 @@
+// Boundaries where it is hard to stay right: stopping and going on, threads, units, grains that leave, necks, large
+// strains, cycles, samples too small.
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+#include "checkpoint.h"
+#include "engine.h"
+#include "forces.h"
+#include "physics.h"
+#include "small_run.h"
+
+// A packed sample of soft disks, confined roughly, then `stages`.
+static engine *sample(int count, const char *shape, const char *integrator, const char *stages) {
+  draft *d = draft_begin();
+  fprintf(
+      d->to,
+      "seed: 5\ngrains: {count: %d, radius: {law: uniform, min: 0.5e-3, max: 1e-3}, thickness: 1.5e-3}\n"
+      "material: {young: 1e8, density: 2675, friction: 0.4, damping: 1e-3}\nmass_scaling: 1e4\n"
+      "contact: {exponent: 10, vR: 1e-3}\npack: {width: %g%s}\ncontinuum: {refresh: 20}\nintegrator: {%s}\nstages:\n"
+      "  - {kind: confine, pressure: 1e5, ramp: 0.05, tolerance: 0.5, unbalanced: 1, friction: 0.1}\n%s",
+      count, 1.35e-3 * sqrt(count), shape, integrator, stages);
+  return engine_start(d);
+}
+
+#define IMPLICIT "scheme: implicit_friction, dt: 2e-5"
+#define CIRCLE   ", cut: {shape: circle, radius: 8e-3}"
+
+static void to_stage(engine *e, int stage) {
+  while (e->sim->run.stage < stage)
+    engine_step(e);
+}
+
+// ---- the same bits ----
+
+// The sim as a checkpoint file keeps it, put into a new one.
+static engine *through_a_file(engine *e) {
+  char folder[TAL_PATH_SIZE], path[TAL_PATH_SIZE];
+  const char *base = getenv("TMPDIR");
+  snprintf(folder, sizeof folder, "%s/talus-bounds-XXXXXX", base && *base ? base : "/tmp");
+  assert_non_null(mkdtemp(folder));
+  tal_file_path(path, folder, "checkpoint.h5");
+  tal_run_files files = {0};
+  tal_error err = {""};
+  char *text = tal_scene_text(&e->scene);
+  tal_forces_expand(e->sim); // as a run does: which slots touch
+  assert_int_equal(tal_checkpoint_write(path, NULL, e->sim, text, &files, &err), TAL_OK);
+  draft *d = draft_begin();
+  fputs(text, d->to);
+  engine *other = engine_start(d);
+  if (tal_checkpoint_read(path, other->sim, text, &files, &err) != TAL_OK)
+    fail_msg("%s", err.text);
+  tal_sim_restored(other->sim);
+  tal_run_files_clear(&files);
+  free(text);
+  nftw(folder, remove_entry, 16, FTW_DEPTH | FTW_PHYS);
+  return other;
+}
+
+static const struct {
+  const char *integrator, *stages;
+} resumed[] = {
+    {"dt: 2e-5", "  - {kind: compress, boundary: minimal, method: exact, rate: 0.2, strain: 2e-3}\n"},
+    {"dt: 2e-5", "  - {kind: compress, boundary: minimal, method: penalty, rate: 0.2, strain: 2e-3}\n"},
+    {IMPLICIT, "  - {kind: shear, order: 3, rate: -0.2, strain: 2e-3}\n"},
+    {IMPLICIT, "  - {kind: deform, rates: {xx: 0.1, yy: -0.1}, order: 2, duration: 0.01}\n"},
+};
+
+// EXACT: written to a checkpoint at any step (a refresh just before, or not) and read back, the run goes on bit for
+// bit.
+static void resume(void **state) {
+  (void)state;
+  for (size_t k = 0; k < sizeof resumed / sizeof *resumed; k++) {
+    engine *e = sample(150, "", resumed[k].integrator, resumed[k].stages);
+    to_stage(e, 1);
+    engine_steps(e, 13 + 7 * (int)k);
+    engine *f = through_a_file(e);
+    for (int part = 0; part < 2; part++) {
+      engine_steps(e, 60);
+      engine_steps(f, 60);
+      assert_same_motion(e, f);
+      tal_row a = engine_row(e), b = engine_row(f);
+      assert_memory_equal(&a, &b, sizeof a);
+    }
+    engine_end(f);
+    engine_end(e);
+  }
+}
+
+// EXACT: 1, 2 and 3 threads.
+static void threads(void **state) {
+  (void)state;
+  for (size_t k = 1; k < sizeof resumed / sizeof *resumed; k++) {
+    engine *one = NULL;
+    tal_row first = {0};
+    for (int count = 1; count <= 3; count++) {
+      omp_set_num_threads(count);
+      engine *e = sample(1000, "", resumed[k].integrator, "  - {kind: shear, order: 2, rate: 0.2, strain: 6e-4}\n");
+      to_stage(e, 1);
+      engine_finish(e);
+      tal_row row = engine_row(e);
+      omp_set_num_threads(1);
+      if (!one) {
+        one = e;
+        first = row;
+        continue;
+      }
+      assert_same_motion(one, e);
+      assert_memory_equal(&first, &row, sizeof row);
+      engine_end(e);
+    }
+    engine_end(one);
+    if (k == 2)
+      break;
+  }
+}
+
+// ---- grains that leave, necks, few grains ----
+
+// EXACT: a grain shot out through the loop is counted outside, the rest is held as before; with limits.outside: 0 the
+// run stops and says so. Slow enough it is taken back once the pressure's loop reaches it again.
+static void expelled_grain(void **state) {
+  (void)state;
+  for (int strict = 0; strict < 2; strict++) {
+    engine *e = sample(200, CIRCLE, IMPLICIT, "  - {kind: shear, rate: 0.1, strain: 0.02}\n");
+    e->scene.outside_limit = strict ? 0 : 0.05;
+    to_stage(e, 1);
+    tal_grains *g = &e->sim->grains;
+    int32_t out = e->sim->graph.loop.node[3];
+    double cx = 0, cy = 0;
+    for (size_t i = 0; i < g->count; i++) {
+      cx += g->x[i] / (double)g->count;
+      cy += g->y[i] / (double)g->count;
+    }
+    double away = hypot(g->x[out] - cx, g->y[out] - cy);
+    g->vx[out] = 4 * (g->x[out] - cx) / away;
+    g->vy[out] = 4 * (g->y[out] - cy) / away;
+    tal_error err = {""};
+    tal_status status = TAL_OK;
+    while (status == TAL_OK && !tal_sim_done(e->sim))
+      status = tal_sim_step(e->sim, &err);
+    if (strict) {
+      assert_int_equal(status, TAL_INVALID);
+      assert_non_null(strstr(err.text, "1 of "));
+      assert_non_null(strstr(err.text, "lie outside the loop"));
+    } else {
+      assert_int_equal(status, TAL_OK);
+      tal_row row = engine_row(e);
+      assert_true(row.outside >= 1 && g->bx[out] == 0 && g->by[out] == 0);
+      assert_true(fabs(row.strain_rate_error_xy) < 1e-13);
+    }
+    engine_end(e);
+  }
+}
+
+// EXACT: two clumps joined by one grain: the loop goes round both through the neck, the rows are met, nothing crashes.
+static void neck(void **state) {
+  (void)state;
+  draft *d = draft_begin();
+  fputs("grains:\n  thickness: 1\n  list:\n", d->to);
+  for (int side = -1; side <= 1; side += 2)
+    for (int k = 0; k < 16; k++)
+      fprintf(d->to, "  - {x: %.17g, y: %.17g, r: 1}\n", side * (3.5 + 1.9 * (k % 4)), 1.9 * (k / 4 - 1.5));
+  fputs("  - {x: 0, y: 0.1, r: 1}\n  - {x: -1.75, y: -0.2, r: 1}\n  - {x: 1.75, y: -0.2, r: 1}\n"
+        "material: {young: 1e5, density: 1, friction: 0.2, damping: 1e-3}\ncontact: {vR: 0.1}\n"
+        "continuum: {refresh: 5, peel: 0.2}\nintegrator: {dt: 1e-4}\n"
+        "stages: [{kind: shear, pressure: 300, rate: 0.5, strain: 0.05, order: 3}]\n",
+        d->to);
+  engine *e = engine_start(d);
+  bool at_neck = false;
+  while (!tal_sim_done(e->sim)) {
+    engine_step(e);
+    tal_row row = engine_row(e);
+    assert_true(fabs(row.strain_rate_error_xy) < 1e-12);
+    for (size_t k = 0; k < e->sim->graph.loop.count; k++) // the grain in the middle: reached from one side at least
+      at_neck = at_neck || e->sim->graph.loop.node[k] == 32;
+    assert_int_equal(e->sim->graph.loop.outside_count, 0);
+  }
+  assert_true(at_neck);
+  engine_end(e);
+}
+
+static tal_status outcome(const char *text, tal_error *err) {
+  draft *d = draft_begin();
+  fputs(text, d->to);
+  tal_scene scene;
+  tal_sim *sim;
+  draft_load(d, &scene);
+  tal_status status = tal_sim_create(&sim, &scene, err);
+  while (status == TAL_OK && !tal_sim_done(sim))
+    status = tal_sim_step(sim, err);
+  tal_sim_free(sim);
+  tal_scene_clear(&scene);
+  return status;
+}
+
+// EXACT: one grain, two grains, grains in a row have no loop, a loop of fixed grains cannot move: stopped with the
+// reason. Three grains are enough, at any order.
+static void few_grains(void **state) {
+  (void)state;
+#define FEW                                                                                                            \
+  "material: {young: 1e5, density: 1}\nintegrator: {dt: 1e-4}\n"                                                       \
+  "stages: [{kind: deform, pressure: 100, duration: 0.01, rates: {yy: -0.1}, order: 3}]\n"
+  tal_error err = {""};
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}]}\n", &err), TAL_INVALID);
+  assert_non_null(strstr(err.text, "no Delaunay graph"));
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 1.9, y: 0, r: 1}]}\n", &err),
+                   TAL_INVALID);
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 1.9, y: 0, r: 1}, "
+                               "{x: 3.8, y: 0, r: 1}]}\n",
+                           &err),
+                   TAL_INVALID);
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 9, y: 0, r: 1}, "
+                               "{x: 0, y: 9, r: 1}]}\n",
+                           &err),
+                   TAL_INVALID);
+  assert_non_null(strstr(err.text, "no assembly is left"));
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1, fixed: true}, "
+                               "{x: 1.95, y: 0, r: 1, fixed: true}, {x: 1, y: 1.7, r: 1, fixed: true}]}\n",
+                           &err),
+                   TAL_INVALID);
+  assert_non_null(strstr(err.text, "cannot be imposed"));
+  assert_int_equal(outcome(FEW "grains: {thickness: 1, list: [{x: 0, y: 0, r: 1}, {x: 1.95, y: 0, r: 1}, "
+                               "{x: 1, y: 1.7, r: 1}]}\n",
+                           &err),
+                   TAL_OK);
+}
+
+// ---- far and often ----
+
+// ROUND: 40 % of compression and 40 % of shear of a small sample: as imposed to the last digits, the ledger closes.
+static void large_strain(void **state) {
+  (void)state;
+  engine *e = sample(180, "", IMPLICIT, "  - {kind: compress, boundary: minimal, rate: 1, strain: 0.4, order: 1}\n");
+  engine_finish(e);
+  tal_row row = engine_row(e);
+  assert_near(row.axial_strain, 0.4, 1e-11, 1);
+  assert_near(row.energy_residual, 0, 5e-3, 1);
+  assert_true(row.solid_fraction > 0.6 && row.solid_fraction < 0.95 && row.sigma_yy > row.sigma_xx);
+  engine_end(e);
+  e = sample(220, CIRCLE, IMPLICIT, "  - {kind: shear, rate: 1, strain: 0.4}\n");
+  engine_finish(e);
+  row = engine_row(e);
+  assert_near(row.shear_strain, 0.4, 1e-11, 1);
+  assert_near(row.energy_residual, 0, 5e-3, 1);
+  assert_true(row.solid_fraction > 0.6 && row.solid_fraction < 0.95 && row.multiplier_xy < 0);
+  engine_end(e);
+}
+
+// ROUND: ten cycles of shear of +-1 %: back to no strain, work put in every time, the ledger closes.
+static void ten_cycles(void **state) {
+  (void)state;
+  char stages[4000] = "";
+  size_t used = 0;
+  for (int k = 0; k < 10; k++)
+    used += (size_t)snprintf(stages + used, sizeof stages - used,
+                             "  - {kind: shear, rate: 1, strain: 0.01, order: 1}\n"
+                             "  - {kind: shear, rate: -1, strain: 0.02, order: 1}\n"
+                             "  - {kind: shear, rate: 1, strain: 0.01, order: 1}\n");
+  engine *e = sample(160, CIRCLE, IMPLICIT, stages);
+  double work = 0;
+  for (int cycle = 1; cycle <= 10; cycle++) {
+    while (!tal_sim_done(e->sim) && !(e->sim->run.stage == 3 * cycle && e->sim->run.stage_done))
+      engine_step(e);
+    tal_row row = engine_row(e);
+    assert_near(row.shear_strain, 0, 1e-12, 1);
+    assert_true(row.work_minimal > work);
+    work = row.work_minimal;
+    assert_near(row.energy_residual, 0, 5e-3, 1);
+  }
+  engine_end(e);
+}
+
+// EXACT: plates after minimal conditions take over the strain so far; minimal after plates goes on from theirs. Plates
+// that go leave a ledger that closes.
+static void plates_and_back(void **state) {
+  (void)state;
+  engine *e = sample(150, "", IMPLICIT,
+                     "  - {kind: compress, rate: 0.5, strain: 0.01}\n"
+                     "  - {kind: compress, boundary: minimal, rate: 0.5, strain: 0.01}\n"
+                     "  - {kind: compress, rate: 0.5, strain: 0.01}\n  - {kind: free, duration: 1e-3}\n");
+  for (int stage = 1; stage <= 3; stage++) {
+    while (!(e->sim->run.stage == stage && e->sim->run.stage_done))
+      engine_step(e);
+    tal_row row = engine_row(e);
+    assert_near(row.axial_strain, 0.01 * stage, 1e-9, 1);
+    assert_near(row.energy_residual, 0, 5e-3, 1);
+    assert_true(isnan(row.plate_top) == (stage == 2) && isnan(row.multiplier_yy) == (stage != 2));
+  }
+  engine_finish(e);
+  engine_end(e);
+}
+
+int main(void) {
+  omp_set_num_threads(1);
+  const struct CMUnitTest tests[] = {
+      cmocka_unit_test(resume),     cmocka_unit_test(threads),         cmocka_unit_test(expelled_grain),
+      cmocka_unit_test(neck),       cmocka_unit_test(few_grains),      cmocka_unit_test(large_strain),
+      cmocka_unit_test(ten_cycles), cmocka_unit_test(plates_and_back),
+  };
+  return cmocka_run_group_tests(tests, NULL, NULL);
+}
