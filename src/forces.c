@@ -22,8 +22,9 @@ typedef struct range {
   double credit;
   tal_force_record *sum; // ring; grain g at g & mask, zero where no contact has been added
   size_t mask;
-  size_t done; // grains below are dealt with
-  bool kicks;  // grains are kicked when complete, else forgotten
+  size_t done;    // grains below are dealt with
+  size_t fetched; // records below are asked for
+  bool kicks;     // grains are kicked when complete, else forgotten
 } range;
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
@@ -108,6 +109,13 @@ static size_t slot_of(const tal_contacts *slots, size_t grain) {
   return first;
 }
 
+// Asks for the records of all partners of the next slots: partners come in no order that the processor would foresee.
+static void fetch_ahead(range *t, size_t grain) {
+  const size_t last = grain + t->sim->neighbours.span + TAL_BLOCK, count = t->sim->grains.count;
+  for (; t->fetched < last && t->fetched < count; t->fetched++)
+    __builtin_prefetch(&t->sim->grain_records[t->fetched]);
+}
+
 // All slots whose i lies in [t->done, last).
 static void work_off(range *t, size_t last) {
   const tal_contacts *slots = &t->sim->pairs;
@@ -116,6 +124,7 @@ static void work_off(range *t, size_t last) {
     int count = (int)(end - start < TAL_BLOCK ? end - start : TAL_BLOCK);
     tal_force_block b;
     complete(t, (size_t)slots->i[start], false);
+    fetch_ahead(t, (size_t)slots->i[start]);
     tal_contact_block(t->sim, &t->sweep, start, count, &b);
     add_block(t, &b, start, count);
   }
@@ -129,10 +138,10 @@ static void step_range(tal_sim *sim, tal_sweep sweep, double credit, int part, i
   const size_t beyond = groups * (size_t)(part + 1) / (size_t)parts * GRAINS;
   const size_t last = beyond < sim->grains.count ? beyond : sim->grains.count;
   range t = {.sim = sim, .sweep = sweep, .credit = credit, .sum = sim->sums + (size_t)part * ring, .mask = ring - 1};
-  t.done = first > span ? first - span : 0;
+  t.done = t.fetched = first > span ? first - span : 0;
   t.sweep.moves = false;
   work_off(&t, first);
-  if (parts > 1) {
+  if (parts > 1 && sweep.law & TAL_EFFECT_SPRING) { // the only history
 #pragma omp barrier
   }
   t.sweep.moves = sweep.moves;
