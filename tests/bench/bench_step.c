@@ -21,13 +21,17 @@ typedef struct variant {
   const char *contact; // YAML
   double friction;
   const char *rotation;
+  const char *integrator; // YAML
 } variant;
 
 static const variant variants[] = {
-    {"hertz, damping, regularised, rotation", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true"},
-    {"hertz, damping, spring, rotation", "{normal: hertz, tangential: spring}", 0.45, "true"},
-    {"hertz, damping", "{normal: hertz, tangential: none}", 0, "true"},
-    {"linear", "{normal: linear, tangential: none, stiffness: 5e5}", 0, "true"},
+    {"hertz, damping, regularised, rotation", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
+     "{dt: 1e-5}"},
+    {"hertz, damping, spring, rotation", "{normal: hertz, tangential: spring}", 0.45, "true", "{dt: 1e-5}"},
+    {"hertz, damping", "{normal: hertz, tangential: none}", 0, "true", "{dt: 1e-5}"},
+    {"linear", "{normal: linear, tangential: none, stiffness: 5e5}", 0, "true", "{dt: 1e-5}"},
+    {"the first, implicit, one sweep", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
+     "{scheme: implicit_friction, dt: 1e-4, sweeps: 1}"},
 };
 
 static double cpu_seconds(void) {
@@ -49,9 +53,10 @@ static tal_sim *create(const variant *v, int n, tal_scene *scene) {
           "grains: {count: %d, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
           "material: {young: 30e9, poisson: 0.3, density: 2675, friction: %g%s}\n"
           "mass_scaling: 1e5\ncontact: %s\nrotation: %s\n"
-          "pack: {method: drop_and_roll, width: %g}\nintegrator: {dt: 1e-5}\n"
+          "pack: {method: drop_and_roll, width: %g}\nintegrator: %s\n"
           "stages: [{kind: compress, pressure: 100e3, rate: 5e-3, strain: 0.2}]\n",
-          n, v->friction, strcmp(v->name, "linear") ? ", damping: 0.002" : "", v->contact, v->rotation, 1e-3 * sqrt(n));
+          n, v->friction, strcmp(v->name, "linear") ? ", damping: 0.002" : "", v->contact, v->rotation, 1e-3 * sqrt(n),
+          v->integrator);
   fclose(out);
   tal_scene_errors errors;
   tal_error err;
