@@ -48,10 +48,12 @@ if [ "${1:-}" = --short ]; then
       --set 'metrics=[{take: value, column: mean_slip, at: 2e-4}]'
   done
   # shellcheck disable=SC2086
-  run II $small --set stages.1.strain=2e-4 --set "$II"
-  "$talus" verify "$out/II"
+  run II-1 $small --set stages.1.strain=2e-4 --set "$II"
+  "$talus" verify "$out/II-1"
+  sh "$here/figures.sh" "$out"
   exit 0
 fi
 
 [ $# -gt 0 ] || set -- study times ours I II III big big-III
 for name in "$@"; do part "$name"; done
+sh "$here/figures.sh" "$out"
