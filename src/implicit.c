@@ -1,11 +1,8 @@
-#include "implicit.h"
+#include "implicit_parts.h"
 
 #include "boundary.h"
 #include "forces.h"
 #include "law.h"
-#include "sim.h"
-
-#include <string.h>
 
 // Lanes of a colour, or grains, from which threads pay.
 enum { PARALLEL_FROM = 2000 };
@@ -13,26 +10,10 @@ enum { PARALLEL_FROM = 2000 };
 enum { MORE_SWEEPS = 20, MOST_SWEEPS = 200 };
 enum { BLOCK = TAL_IMPLICIT_BLOCK };
 
-// Constants of a solve.
-typedef struct solve {
-  tal_sim *sim;
-  tal_implicit *system;
-  double kick, inverse_vR, exponent, tangential_ratio;
-  unsigned effects;
-  bool advances;
-} solve;
-
-// A block of lanes: velocities of i against j (spins apart), and what is to be pushed.
-typedef struct block {
-  double dx[BLOCK], dy[BLOCK];                       // centre i - centre j
-  double ux[BLOCK], uy[BLOCK], wi[BLOCK], wj[BLOCK]; // velocity i - velocity j, spins
-  double pn[BLOCK], pt[BLOCK];                       // impulses [N s] along n and t on i
-} block;
-
 // ---- bodies ---------------------------------------------------------------------------------------------------------
 
 // Velocities before the kick, and after it with the boundary's forces and gravity alone.
-static void set_grains(const solve *s) {
+static void set_grains(const tal_implicit_solve *s) {
   const tal_grains *g = &s->sim->grains;
   const double *gravity = s->sim->scene->gravity;
   const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
@@ -52,7 +33,7 @@ static void set_grains(const solve *s) {
 }
 
 // The nearest point of the wall to each grain that may touch it.
-static void set_walls(const solve *s) {
+static void set_walls(const tal_implicit_solve *s) {
   const tal_grains *g = &s->sim->grains;
   const tal_contacts *slots = &s->sim->wall_contacts;
   for (size_t c = 0; c < slots->count; c++) {
@@ -65,244 +46,15 @@ static void set_walls(const solve *s) {
   }
 }
 
-TAL_KERNEL void fetch_places(block *b, const tal_implicit_lanes *m, size_t start, int count) {
-  for (int k = 0; k < count; k += 4) {
-    tal_lanes r[4];
-    for (int q = 0; q < 4; q++)
-      r[q] = m->body[m->i[start + k + q]].place - m->body[m->j[start + k + q]].place;
-    tal_lanes_turn(r);
-    memcpy(b->dx + k, &r[0], sizeof r[0]);
-    memcpy(b->dy + k, &r[1], sizeof r[1]);
-  }
-}
-
-// i's velocity less j's; the spins of both.
-TAL_KERNEL void meet(const tal_lanes *i, const tal_lanes *j, tal_lanes *out) {
-  *out = __builtin_shufflevector(__builtin_shufflevector(*i - *j, *i, 0, 1, 6, 6), *j, 0, 1, 2, 7);
-}
-
-TAL_KERNEL void fetch_velocities(block *b, const tal_implicit_lanes *m, size_t start, int count, bool before) {
-  for (int k = 0; k < count; k += 4) {
-    tal_lanes r[4];
-    for (int q = 0; q < 4; q++) {
-      const tal_implicit_body *i = &m->body[m->i[start + k + q]], *j = &m->body[m->j[start + k + q]];
-      meet(before ? &i->before : &i->now, before ? &j->before : &j->now, &r[q]);
-    }
-    tal_lanes_turn(r);
-    memcpy(b->ux + k, &r[0], sizeof r[0]);
-    memcpy(b->uy + k, &r[1], sizeof r[1]);
-    memcpy(b->wi + k, &r[2], sizeof r[2]);
-    memcpy(b->wj + k, &r[3], sizeof r[3]);
-  }
-}
-
-// Gives both bodies of each lane its impulses. Wall slots and fillers have bodies of their own.
-TAL_KERNEL void push(const block *b, const tal_implicit_lanes *m, size_t start, int count) {
-  const double *restrict nx = m->nx + start, *restrict ny = m->ny + start;
-  const double *restrict mass_i = m->mass_i + start, *restrict mass_j = m->mass_j + start;
-  const double *restrict inertia_i = m->inertia_i + start, *restrict inertia_j = m->inertia_j + start;
-  const double *restrict arm_i = m->arm_i + start, *restrict arm_j = m->arm_j + start;
-  double xi[BLOCK], yi[BLOCK], wi[BLOCK], xj[BLOCK], yj[BLOCK], wj[BLOCK];
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    double px = b->pn[k] * nx[k] - b->pt[k] * ny[k], py = b->pn[k] * ny[k] + b->pt[k] * nx[k];
-    xi[k] = px * mass_i[k];
-    yi[k] = py * mass_i[k];
-    wi[k] = -(arm_i[k] * b->pt[k] * inertia_i[k]);
-    xj[k] = -(px * mass_j[k]);
-    yj[k] = -(py * mass_j[k]);
-    wj[k] = -(arm_j[k] * b->pt[k] * inertia_j[k]);
-  }
-  for (int k = 0; k < count; k += 4) {
-    tal_lanes i[4], j[4];
-    memcpy(&i[0], xi + k, sizeof i[0]);
-    memcpy(&i[1], yi + k, sizeof i[1]);
-    memcpy(&i[2], wi + k, sizeof i[2]);
-    i[3] = i[2];
-    memcpy(&j[0], xj + k, sizeof j[0]);
-    memcpy(&j[1], yj + k, sizeof j[1]);
-    memcpy(&j[2], wj + k, sizeof j[2]);
-    j[3] = j[2];
-    tal_lanes_turn(i);
-    tal_lanes_turn(j);
-    for (int q = 0; q < 4; q++) {
-      m->body[m->i[start + k + q]].now += i[q];
-      m->body[m->j[start + k + q]].now += j[q];
-    }
-  }
-}
-
-// Slip of i against j along t = (-ny, nx), eq (9).
-TAL_KERNEL double slip_of(const block *b, const tal_implicit_lanes *m, size_t lane, int k) {
-  return m->nx[lane] * b->uy[k] - m->ny[lane] * b->ux[k] - (m->arm_i[lane] * b->wi[k] + m->arm_j[lane] * b->wj[k]);
-}
-
-TAL_KERNEL double approach_of(const block *b, const tal_implicit_lanes *m, size_t lane, int k) {
-  return -(m->nx[lane] * b->ux[k] + m->ny[lane] * b->uy[k]);
-}
-
-// ---- the start of a solve -------------------------------------------------------------------------------------------
-
-// Geometry, elastic force and viscosity of a block, and the approach and slip it starts the kick with.
-TAL_KERNEL void see(const solve *s, block *b, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  fetch_places(b, m, start, count);
-  fetch_velocities(b, m, start, count, true);
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double distance = sqrt(b->dx[k] * b->dx[k] + b->dy[k] * b->dy[k]), inverse = 1 / distance;
-    double overlap = m->reach[lane] - distance;
-    m->nx[lane] = b->dx[k] * inverse;
-    m->ny[lane] = b->dy[k] * inverse;
-    m->overlap[lane] = overlap;
-    m->arm_i[lane] = m->radius_i[lane] - m->share_i[lane] * overlap;
-    m->arm_j[lane] = m->reach[lane] - m->radius_i[lane] - 0.5 * overlap;
-    tal_meeting meeting = {.overlap = overlap, .stiffness = m->stiffness[lane], .damping = m->damping[lane]};
-    m->elastic[lane] = tal_contact_law(meeting, (tal_law_constants){0}, effects & TAL_EFFECT_HERTZ).fe;
-    m->viscosity[lane] = effects & TAL_EFFECT_DAMPING ? tal_viscosity(meeting, effects) : 0;
-    m->approach[lane] = approach_of(b, m, lane, k);
-    m->slip[lane] = slip_of(b, m, lane, k);
-  }
-}
-
-TAL_KERNEL double within(double value, double cap) {
-  double above = value > cap ? cap : value;
-  return above < -cap ? -cap : above;
-}
-
-// The forces of the last step, within today's bounds.
-TAL_KERNEL void remember(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double fn = m->elastic[lane] + (effects & TAL_EFFECT_DAMPING ? m->kept_viscous[lane] : 0);
-    fn = fn > 0 ? fn : 0;
-    m->fn[lane] = m->overlap[lane] > 0 ? fn : 0;
-    m->ft[lane] = within(m->kept_spring[lane], m->friction[lane] * m->fn[lane]);
-  }
-}
-
-// Tangential stiffness now, and the spring's force after it has moved with the step [eqs (7)-(8)].
-TAL_KERNEL void move_springs(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  const double kick = s->advances ? s->kick : 0, ratio = s->tangential_ratio;
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double touching = m->overlap[lane] > 0 ? m->overlap[lane] : 0, before = m->kept_stiffness[lane];
-    double slope = effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(m->stiffness[lane], sqrt(touching))
-                                              : (touching > 0 ? m->stiffness[lane] : 0);
-    double stiffness = ratio * slope, spring = m->kept_spring[lane];
-    spring = stiffness < before ? spring * (stiffness / before) : spring;
-    spring -= stiffness * kick * m->slip[lane];
-    m->spring_stiffness[lane] = stiffness;
-    m->spring[lane] = within(spring, m->friction[lane] * m->fn[lane]);
-  }
-}
-
-TAL_KERNEL void begin_block(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  block b;
-  see(s, &b, start, count, effects);
-  remember(s, start, count, effects);
-  if (effects & TAL_EFFECT_SPRING)
-    move_springs(s, start, count, effects);
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    b.pn[k] = s->kick * m->fn[start + (size_t)k];
-    b.pt[k] = s->kick * m->ft[start + (size_t)k];
-  }
-  push(&b, m, start, count);
-}
-
 // ---- sweeps ---------------------------------------------------------------------------------------------------------
 
-// The forces that are right if nothing else changes; the largest change of a friction force over its cap.
-TAL_KERNEL double correct_block(const solve *s, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  block b;
-  const double kick = s->kick, inverse_vR = s->inverse_vR;
-  const bool advances = s->advances;
-  double free[BLOCK], given[BLOCK], brake[BLOCK], slip[BLOCK], share[BLOCK] = {0}, part[BLOCK], largest = 0;
-  fetch_velocities(&b, m, start, count, false);
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double yield = 0.5 * kick * (m->mass_i[lane] + m->mass_j[lane]);
-    double mean = 0.5 * (m->approach[lane] + approach_of(&b, m, lane, k)) + yield * m->fn[lane];
-    double fn = m->overlap[lane] > 0 ? tal_implicit_normal(m->elastic[lane], m->viscosity[lane], mean, yield) : 0;
-    given[k] = kick * (m->mass_i[lane] + m->mass_j[lane] + m->arm_i[lane] * m->arm_i[lane] * m->inertia_i[lane] +
-                       m->arm_j[lane] * m->arm_j[lane] * m->inertia_j[lane]);
-    free[k] = slip_of(&b, m, lane, k) - given[k] * m->ft[lane];
-    brake[k] = given[k] * m->friction[lane] * fn * inverse_vR;
-    slip[k] = fabs(free[k]) * inverse_vR;
-    b.pn[k] = kick * (fn - m->fn[lane]);
-    m->fn[lane] = fn;
-  }
-  if (effects & TAL_EFFECT_REGULARISED)
-    tal_implicit_shares(slip, brake, share, count, s->exponent);
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double cap = m->friction[lane] * m->fn[lane], force = free[k] > 0 ? -(cap * share[k]) : cap * share[k];
-    if (effects & TAL_EFFECT_SPRING) {
-      double moved =
-          tal_implicit_spring(m->spring[lane], m->spring_stiffness[lane] * kick, free[k], m->slip[lane], given[k], cap);
-      force = advances ? moved : within(m->spring[lane], cap);
-    }
-    double change = force - m->ft[lane];
-    b.pt[k] = kick * change;
-    m->ft[lane] = force;
-    part[k] = fabs(change) / (cap > 0 ? cap : 1);
-  }
-#pragma omp simd reduction(max : largest)
-  for (int k = 0; k < count; k++)
-    largest = part[k] > largest ? part[k] : largest;
-  push(&b, m, start, count);
-  return largest;
-}
-
-// Takes the share `factor` of all friction off (negative) or adds it, leaving the forces as they are noted.
-TAL_KERNEL double press_block(const solve *s, size_t start, int count, double factor) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  block b;
-  for (int k = 0; k < count; k++) {
-    b.pn[k] = 0;
-    b.pt[k] = factor * s->kick * m->ft[start + (size_t)k];
-  }
-  push(&b, m, start, count);
-  return 0;
-}
-
-// Work over the kick: each force times the mean of the speeds at both ends.
-TAL_KERNEL tal_implicit_works work_of_block(const solve *s, size_t start, int count) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  block b;
-  double friction[BLOCK], damping[BLOCK];
-  fetch_velocities(&b, m, start, count, false);
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    friction[k] = m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
-    damping[k] = (m->elastic[lane] - m->fn[lane]) * (m->approach[lane] + approach_of(&b, m, lane, k));
-  }
-  tal_implicit_works sum = {0, 0};
-  for (int k = 0; k < count; k++) {
-    sum.friction += friction[k];
-    sum.damping += damping[k];
-  }
-  return (tal_implicit_works){0.5 * s->kick * sum.friction, 0.5 * s->kick * sum.damping};
-}
-
-static tal_implicit_works work(const solve *s) {
+static tal_implicit_works work(const tal_implicit_solve *s) {
   tal_implicit *m = s->system;
   const size_t blocks = (m->lanes + BLOCK - 1) / BLOCK;
   tal_implicit_works sum = {0, 0};
 #pragma omp parallel for schedule(static) if (m->lanes > PARALLEL_FROM)
   for (size_t k = 0; k < blocks; k++)
-    m->partial[k] = work_of_block(s, k * BLOCK, (int)(m->lanes - k * BLOCK < BLOCK ? m->lanes - k * BLOCK : BLOCK));
+    m->partial[k] = tal_implicit_work(s, k * BLOCK, (int)(m->lanes - k * BLOCK < BLOCK ? m->lanes - k * BLOCK : BLOCK));
   for (size_t k = 0; k < blocks; k++) {
     sum.friction += m->partial[k].friction;
     sum.damping += m->partial[k].damping;
@@ -310,53 +62,23 @@ static tal_implicit_works work(const solve *s) {
   return sum;
 }
 
-typedef enum pass { BEGIN, CORRECT, PRESS } pass;
-
-// The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
-#define VARIANTS(X)                                                                                                    \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED)                                                    \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING)
-
-TAL_KERNEL double take_block(const solve *s, pass what, size_t start, int count, double factor, unsigned effects) {
-  switch (what) {
-  case BEGIN:
-    begin_block(s, start, count, effects);
-    return 0;
-  case CORRECT:
-    return correct_block(s, start, count, effects);
-  default:
-    return press_block(s, start, count, factor);
-  }
-}
-
-static double take_variant(const solve *s, pass what, size_t start, int count, double factor) {
-  const unsigned kinds = TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION;
-  switch (s->effects & kinds) {
-#define X(mask)                                                                                                        \
-  case (mask):                                                                                                         \
-    return take_block(s, what, start, count, factor, (mask));
-    VARIANTS(X)
-#undef X
-  default:
-    return take_block(s, what, start, count, factor, s->effects & kinds);
-  }
-}
-
 // What a boundary imposes on the loop is met by forces of its own, found beside those of the contacts.
-static void couple(const solve *s, bool first) {
+static void couple(const tal_implicit_solve *s, bool first) {
   const tal_boundary *boundary = s->sim->boundary;
   if (boundary && boundary->couple && s->advances)
     boundary->couple(s->sim, s->kick, first);
 }
 
 // One block of the colour that begins at lane `from`.
-static void take(const solve *s, pass what, size_t from, size_t start, size_t to, size_t size, double factor) {
+static void take(const tal_implicit_solve *s, tal_implicit_pass what, size_t from, size_t start, size_t to, size_t size,
+                 double factor) {
   const int count = (int)(to - start < size ? to - start : size);
-  s->system->partial[(start - from) / size].friction = take_variant(s, what, start, count, factor);
+  s->system->partial[(start - from) / size].friction = tal_implicit_take(s, what, start, count, factor);
 }
 
 // Blocks of one colour. A parallel region costs a small sample more than its work, even when it is told to be none.
-static void take_colour(const solve *s, pass what, size_t from, size_t to, size_t size, double factor, bool parallel) {
+static void take_colour(const tal_implicit_solve *s, tal_implicit_pass what, size_t from, size_t to, size_t size,
+                        double factor, bool parallel) {
   if (!parallel) {
     for (size_t start = from; start < to; start += size)
       take(s, what, from, start, to, size, factor);
@@ -368,7 +90,7 @@ static void take_colour(const solve *s, pass what, size_t from, size_t to, size_
 }
 
 // One pass over all colours; the largest of what the blocks return.
-static double sweep(const solve *s, pass what, double factor) {
+static double sweep(const tal_implicit_solve *s, tal_implicit_pass what, double factor) {
   tal_implicit *m = s->system;
   double largest = 0;
   for (size_t colour = 0; colour < m->colour_count; colour++) {
@@ -379,34 +101,34 @@ static double sweep(const solve *s, pass what, double factor) {
     for (size_t k = 0; k < (to - from + size - 1) / size; k++)
       largest = m->partial[k].friction > largest ? m->partial[k].friction : largest;
   }
-  m->sweeps += what == CORRECT;
+  m->sweeps += what == TAL_IMPLICIT_CORRECT;
   return largest;
 }
 
 // With all friction taken down to the share x its work is x A + x^2 B, B > 0: nil at x = -A/B.
-static tal_implicit_works take_down(const solve *s, double all) {
+static tal_implicit_works take_down(const tal_implicit_solve *s, double all) {
   tal_implicit *m = s->system;
-  sweep(s, PRESS, -1);
+  sweep(s, TAL_IMPLICIT_PRESS, -1);
   double linear = work(s).friction, share = linear < 0 ? linear / (linear - all) : 0;
   for (size_t lane = 0; lane < m->lanes; lane++)
     m->lane.ft[lane] *= share;
-  sweep(s, PRESS, 1);
+  sweep(s, TAL_IMPLICIT_PRESS, 1);
   couple(s, false);
   return work(s);
 }
 
 // Sweeps; the work of a step.
-static tal_implicit_works settle(const solve *s, const tal_scene_integrator *plan) {
+static tal_implicit_works settle(const tal_implicit_solve *s, const tal_scene_integrator *plan) {
   int64_t sweeps = s->advances ? plan->sweeps : MORE_SWEEPS;
   double change = 0;
-  sweep(s, BEGIN, 0);
+  sweep(s, TAL_IMPLICIT_BEGIN, 0);
   couple(s, true);
   for (int64_t k = 0; k < sweeps; k++) {
-    change = sweep(s, CORRECT, 0);
+    change = sweep(s, TAL_IMPLICIT_CORRECT, 0);
     couple(s, false);
   }
   for (int k = 0; k < MOST_SWEEPS && change > plan->tolerance; k++) {
-    change = sweep(s, CORRECT, 0);
+    change = sweep(s, TAL_IMPLICIT_CORRECT, 0);
     couple(s, false);
   }
   if (!s->advances)
@@ -415,7 +137,7 @@ static tal_implicit_works settle(const solve *s, const tal_scene_integrator *pla
   if (!(s->effects & TAL_EFFECT_REGULARISED))
     return done;
   for (int k = 0; done.friction > 0 && k < MORE_SWEEPS; k++) {
-    sweep(s, CORRECT, 0);
+    sweep(s, TAL_IMPLICIT_CORRECT, 0);
     couple(s, false);
     done = work(s);
   }
@@ -455,7 +177,7 @@ void tal_implicit_answer(tal_sim *sim) {
       answer_pair(&sim->force_records[m->slot[lane]], m, lane);
 }
 
-static void answer_walls(const solve *s) {
+static void answer_walls(const tal_implicit_solve *s) {
   const tal_implicit_lanes *m = &s->system->lane;
   for (size_t k = 0; k < s->system->wall_lanes; k++) {
     size_t lane = s->system->wall_lane[k];
@@ -464,7 +186,7 @@ static void answer_walls(const solve *s) {
 }
 
 // What the next step starts from.
-static void keep(const solve *s) {
+static void keep(const tal_implicit_solve *s) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   const bool springs = s->effects & TAL_EFFECT_SPRING;
 #pragma omp simd
@@ -479,14 +201,14 @@ static void keep(const solve *s) {
 static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
   if (sim->implicit.listed != sim->neighbours.rebuilds)
     tal_implicit_list(sim);
-  solve s = {.sim = sim,
-             .system = &sim->implicit,
-             .kick = kick,
-             .inverse_vR = 1 / sim->constants.vR,
-             .exponent = sim->scene->contact.exponent,
-             .tangential_ratio = sim->constants.tangential_ratio,
-             .effects = sim->effects,
-             .advances = advances};
+  tal_implicit_solve s = {.sim = sim,
+                          .system = &sim->implicit,
+                          .kick = kick,
+                          .inverse_vR = 1 / sim->constants.vR,
+                          .exponent = sim->scene->contact.exponent,
+                          .tangential_ratio = sim->constants.tangential_ratio,
+                          .effects = sim->effects,
+                          .advances = advances};
   const tal_scene_stage *stage = tal_sim_stage(sim);
   set_grains(&s);
   set_walls(&s);

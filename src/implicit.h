@@ -72,7 +72,7 @@ typedef struct tal_implicit {
   size_t lanes, capacity, body_capacity;
   size_t *wall_lane; // owned; [wall_lanes] lanes of the wall slots
   size_t wall_lanes;
-  tal_implicit_works *partial; // owned; [capacity / TAL_IMPLICIT_BLOCK + 66] what each block returned
+  tal_implicit_works *partial; // owned; [capacity / TAL_IMPLICIT_VECTOR + 1] what each block returned
   bool all_free;               // no grain is fixed and no spin held
   size_t colour_count;
   size_t first[66]; // first lane of each colour

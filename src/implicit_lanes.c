@@ -40,7 +40,7 @@ static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
   s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
   s->wall_lane = NULL;
-  s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_BLOCK + COLOURS + 2, sizeof *s->partial);
+  s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_VECTOR + 1, sizeof *s->partial);
   tal_implicit_lanes *m = &s->lane;
   m->body = tal_alloc(s->body_capacity, sizeof *m->body);
   m->i = tal_alloc(s->capacity, sizeof *m->i);

@@ -299,7 +299,7 @@ static void test_momenta(void **state) {
 // ROUND: the same about one grain with more contacts than there are colours: those that find none are swept in order.
 static void test_hub(void **state) {
   (void)state;
-  enum { RIM = 90 };
+  enum { RIM = 1000 };
   draft *d = draft_begin();
   const double r = 1, ring = r / sin(3.14159265358979 / RIM) * 0.9995, hub = ring - 0.9995 * r;
   fprintf(d->to, "grains: {list: [{x: 0, y: 0, r: %.17g, omega: 0.2}", hub);
@@ -318,8 +318,8 @@ static void test_hub(void **state) {
   momenta now = total(&e->sim->grains);
   assert_near(now.x, before.x, 1e-13, before.scale);
   assert_near(now.y, before.y, 1e-13, before.scale);
-  assert_near(now.angular, before.angular, 1e-12, before.scale);
-  assert_true(e->sim->grains.omega[0] < 0.2 - 1e-6); // the rim takes some of it
+  assert_near(now.angular, before.angular, 1e-12, before.angular); // the hub has nearly all of it
+  assert_true(e->sim->grains.omega[0] < 0.2 - 1e-9); // the rim takes some of it
   engine_end(e);
 }
 
