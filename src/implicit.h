@@ -9,7 +9,6 @@
 
 #include "base.h"
 #include "lanes.h"
-#include "law_implicit.h"
 #include <stdbool.h>
 
 struct tal_sim;

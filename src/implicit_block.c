@@ -4,6 +4,7 @@
 
 #include "effects.h"
 #include "law.h"
+#include "law_implicit.h"
 
 #include <string.h>
 

@@ -5,6 +5,9 @@
 
 #include "effects.h"
 
+// Contacts that the implicit scheme takes at a time.
+enum { TAL_IMPLICIT_BLOCK = 64 };
+
 typedef double tal_lanes __attribute__((vector_size(32), may_alias));
 typedef double tal_lanes_pair __attribute__((vector_size(16), may_alias));
 

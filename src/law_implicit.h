@@ -4,6 +4,7 @@
 #ifndef TAL_LAW_IMPLICIT_H
 #define TAL_LAW_IMPLICIT_H
 
+#include "lanes.h"
 #include "root.h"
 #include <math.h>
 
@@ -43,9 +44,6 @@ TAL_KERNEL double tal_implicit_round(double u, double power, double a, double b,
   return u - 2 * excess * slope / (2 * slope * slope - excess * bend);
 }
 
-// At most this many contacts at a time.
-enum { TAL_IMPLICIT_BLOCK = 64 };
-
 // out[k] = u[k]^e for a whole e >= 0, by squaring.
 TAL_KERNEL void tal_whole_powers(const double *restrict u, double *restrict out, int count, int e) {
   double square[TAL_IMPLICIT_BLOCK];
@@ -65,8 +63,8 @@ TAL_KERNEL void tal_whole_powers(const double *restrict u, double *restrict out,
 // Rounds from the guess to round-off for c up to 50, 1e-11 of u for c = 200 (tests/test_implicit_friction.c).
 enum { TAL_IMPLICIT_ROUNDS = 4 };
 
-// Roots of `count` contacts, a multiple of the vector's length; a and b as above. A whole c takes products where
-// another takes a logarithm and an exponential.
+// Roots of `count` contacts, a multiple of the vector's length and at most a block; a and b as above. A whole c takes
+// products where another takes a logarithm and an exponential.
 TAL_KERNEL void tal_implicit_shares(const double *restrict a, const double *restrict b, double *restrict u, int count,
                                     double c) {
   double power[TAL_IMPLICIT_BLOCK];
