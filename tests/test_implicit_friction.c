@@ -319,7 +319,7 @@ static void test_hub(void **state) {
   assert_near(now.x, before.x, 1e-13, before.scale);
   assert_near(now.y, before.y, 1e-13, before.scale);
   assert_near(now.angular, before.angular, 1e-12, before.angular); // the hub has nearly all of it
-  assert_true(e->sim->grains.omega[0] < 0.2 - 1e-9); // the rim takes some of it
+  assert_true(e->sim->grains.omega[0] < 0.2 - 1e-9);               // the rim takes some of it
   engine_end(e);
 }
 
