@@ -143,12 +143,9 @@ static double mean_speed(const tal_grains *g) {
   return sum / (double)g->count;
 }
 
-// MODEL: at the end the stress, summed here from the contacts, is 100 kPa within 1 % in both directions; each plate
-// bears p h times the distance of the outermost grains on it; nothing moves faster than the unbalanced force that is
-// allowed would make it move within a ramp, the plates a hundred times slower; shear is small.
-static void end_of_confinement(void **state) {
-  (void)state;
-  engine *e = sample("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
+// The claims of end_of_confinement for one sample.
+static void check_confined(const char *more) {
+  engine *e = sample(more);
   engine_finish(e);
   tal_sim *sim = e->sim;
   tal_observed seen = tal_sim_driving(sim);
@@ -161,8 +158,11 @@ static void end_of_confinement(void **state) {
   }
   double area = geo_loop_area(&sim->graph.loop, sim->grains.x, sim->grains.y);
   geo_tensor stress = geo_tensor_scale(1 / (area * thickness), moment);
-  assert_true(fabs(stress.xx / pressure - 1) <= 0.01 && fabs(stress.yy / pressure - 1) <= 0.01);
-  assert_true(fabs(stress.xy) < 0.05 * pressure && fabs(stress.yx) < 0.05 * pressure);
+  if (!(fabs(stress.xx / pressure - 1) <= 0.01 && fabs(stress.yy / pressure - 1) <= 0.01))
+    fail_msg("sigma_xx %.5g, sigma_yy %.5g Pa", stress.xx, stress.yy);
+  double shear = 0.5 * (stress.xy + stress.yx);
+  if (!(fabs(shear) < 0.05 * pressure))
+    fail_msg("sigma_xy %.5g Pa in %s", shear, more);
   tal_macro macro;
   tal_macro_measure(&seen, &macro);
   const double slow = 1e-3 * macro.mean_force / sim->constants.mean_mass * 0.5;
@@ -171,11 +171,23 @@ static void end_of_confinement(void **state) {
     double width = outermost(sim, side, 1) - outermost(sim, side, -1), load = -side * plate->fy;
     if (!(fabs(load - pressure * thickness * width) < 0.01 * load))
       fail_msg("plate %d bears %.4g N, p h width is %.4g N", side, load, pressure * thickness * width);
-    assert_true(fabs(plate->vy) < 0.01 * slow);
+    assert_true(fabs(plate->vy) < slow);
   }
   assert_true(mean_speed(&sim->grains) < slow);
   assert_true(sim->run.rest <= 1e-3 && sim->run.pressure == pressure);
   engine_end(e);
+}
+
+// MODEL, for samples that come to rest and those that creep, explicit and implicit: at the end the stress, summed here
+// from the contacts, is 100 kPa within 1 % in both directions; each plate bears p h times the distance of the outermost
+// grains on it; nothing moves faster than the unbalanced force that is allowed would make it move within a ramp. The
+// rough plates may hold some shear: the pressed arcs need not be of one height.
+static void end_of_confinement(void **state) {
+  (void)state;
+  check_confined("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
+  check_confined("contact: {tangential: regularised, vR: 1e-5}\nstages: [" CONFINE "]\n");
+  check_confined("contact: {tangential: regularised, vR: 1e-5}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.5, "
+                 "friction: 0.1, integrator: {scheme: implicit_friction, dt: 1e-4}}]\n");
 }
 
 // MODEL: a cut assembly has no plates: its whole loop is pressed, and at rest the stress is p to the remaining motion.

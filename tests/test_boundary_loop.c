@@ -65,10 +65,14 @@ static void scatter(assembly *a, size_t count, double size, uint64_t *seed) {
     add_disc(a, size * random_unit(seed), size * random_unit(seed), 0.2 + 0.3 * random_unit(seed));
 }
 
-static int peel(assembly *a, double gap_limit) {
+static int peel_beside(assembly *a, const unsigned char *side, double gap_limit) {
   const geo_delaunay_backend *backend = geo_delaunay_backend_find("qhull");
   assert_int_equal(geo_delaunay(backend, a->x, a->y, NULL, a->n, &a->mesh, NULL), GEO_DELAUNAY_OK);
-  return geo_loop_peel(&a->loop, &a->mesh, a->x, a->y, a->radius, NULL, gap_limit, a->inside);
+  return geo_loop_peel(&a->loop, &a->mesh, a->x, a->y, a->radius, side, gap_limit, a->inside);
+}
+
+static int peel(assembly *a, double gap_limit) {
+  return peel_beside(a, NULL, gap_limit);
 }
 
 static double turn(const assembly *a, int32_t p, int32_t q, int32_t r) {
@@ -402,13 +406,41 @@ static void set(void **state) {
   assert_null(loop.node);
 }
 
+// ROUND: a block on four discs, two of them apart. Without a side the loop goes up between them, a trapezium of area 2
+// less; along a rigid side it spans the gap, and still takes in a disc a little above the line of its neighbours.
+static void rigid_side(void **state) {
+  (void)state;
+  unsigned char side[28] = {0};
+  for (int lifted = 0; lifted < 2; lifted++) {
+    assembly *a = make_assembly();
+    add_block(a, 0, 1, 6, 4);
+    const double x[] = {0, 1, 4, 5};
+    for (int k = 0; k < 4; k++) {
+      side[a->n] = 1;
+      add_disc(a, x[k], lifted && k == 1 ? 0.05 : 0, 0.5);
+    }
+    assert_int_equal(peel_beside(a, side, 0.5), 0);
+    assert_float_equal(geo_loop_area(&a->loop, a->x, a->y), lifted ? 20 - 0.5 * 4 * 0.05 : 20, 1e-13);
+    check_simple(a);
+    assert_int_equal(peel(a, 0.5), 0);
+    assert_float_equal(geo_loop_area(&a->loop, a->x, a->y), lifted ? 18 - 0.5 * 1 * 0.05 - 0.5 * 1 * 0.05 : 18, 1e-13);
+    free_assembly(a);
+  }
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(block),      cmocka_unit_test(notch),
-      cmocka_unit_test(rattlers),   cmocka_unit_test(necks),
-      cmocka_unit_test(three),      cmocka_unit_test(random_clouds),
-      cmocka_unit_test(invariance), cmocka_unit_test(velocity_gradient),
-      cmocka_unit_test(set),        cmocka_unit_test(narrowest_bridge),
+      cmocka_unit_test(rigid_side),
+      cmocka_unit_test(block),
+      cmocka_unit_test(notch),
+      cmocka_unit_test(rattlers),
+      cmocka_unit_test(necks),
+      cmocka_unit_test(three),
+      cmocka_unit_test(random_clouds),
+      cmocka_unit_test(invariance),
+      cmocka_unit_test(velocity_gradient),
+      cmocka_unit_test(set),
+      cmocka_unit_test(narrowest_bridge),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
