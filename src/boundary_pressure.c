@@ -1,7 +1,9 @@
 // Pressure on the Delaunay boundary, eq (22) [P 2.5, 3.2]: each edge of the loop carries p h times its length along the
 // inward normal, half to each end. On a closed loop that is a force and moment free system of uniform stress p.
-// With plates only the two arcs between the outermost grains at the plates are pressed; the plates load the rest.
-// While the plates bed a packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
+// With plates only the two arcs between the outermost grains at the plates are pressed; the plates load the rest. The
+// arcs' ends need not be of one height: the horizontal part of the pressure on the chord between the two ends at a
+// plate makes up for that, so that the pressure pushes nothing sideways and bears no shear. While the plates bed a
+// packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
 #include "boundary.h"
 
 #include <stdlib.h>
@@ -76,6 +78,15 @@ static void press_arc(tal_sim *sim, int64_t from, size_t edges) {
   }
 }
 
+// The horizontal part of the pressure on the straight line between two places.
+static void press_chord(tal_sim *sim, int64_t from, int64_t to) {
+  const int32_t *node = sim->graph.loop.node;
+  tal_grains *g = &sim->grains;
+  double fx = -0.5 * sim->run.pressure * sim->constants.thickness * (g->y[node[to]] - g->y[node[from]]);
+  g->bx[node[from]] += fx;
+  g->bx[node[to]] += fx;
+}
+
 static size_t edges_between(const geo_loop *loop, int64_t from, int64_t to) {
   return (size_t)(to >= from ? to - from : to + (int64_t)loop->count - from);
 }
@@ -97,6 +108,8 @@ static void apply(tal_sim *sim) {
   }
   press_arc(sim, run->arc_bottom_right, edges_between(loop, run->arc_bottom_right, run->arc_top_right));
   press_arc(sim, run->arc_top_left, edges_between(loop, run->arc_top_left, run->arc_bottom_left));
+  press_chord(sim, run->arc_bottom_left, run->arc_bottom_right);
+  press_chord(sim, run->arc_top_right, run->arc_top_left);
 }
 
 const tal_boundary tal_boundary_pressure = {.name = "pressure",

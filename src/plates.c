@@ -42,8 +42,19 @@ double tal_plates_distance(const tal_sim *sim) {
 }
 
 void tal_plates_drive(tal_sim *sim, double speed) {
-  tal_walls_plate(&sim->walls, +1)->vy = 0.5 * speed;
-  tal_walls_plate(&sim->walls, -1)->vy = -0.5 * speed;
+  for (int side = 1; side >= -1; side -= 2) {
+    tal_wall *plate = tal_walls_plate(&sim->walls, side);
+    plate->vx = 0;
+    plate->vy = 0.5 * side * speed;
+  }
+}
+
+void tal_plates_slide(tal_sim *sim, double speed_limit) {
+  tal_wall *bottom = tal_walls_plate(&sim->walls, +1), *top = tal_walls_plate(&sim->walls, -1);
+  const double mass = sqrt((double)sim->grains.count) * sim->constants.mean_mass;
+  double speed = top->vx + 0.5 * sim->dt * (top->fx - bottom->fx) / mass;
+  top->vx = fmax(-speed_limit, fmin(speed_limit, speed));
+  bottom->vx = -top->vx;
 }
 
 static double width_at_plate(const tal_sim *sim, int side) {

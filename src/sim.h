@@ -22,6 +22,8 @@
   X(int64_t, stage_step, "1", "steps taken in this stage")                                                             \
   X(double, stage_start, "s", "time at which this stage began")                                                        \
   X(int64_t, bedding, "1", "1 while the plates bed the uneven ends of a packing")                                      \
+  X(int64_t, settling, "1", "loops under which the assembly has come to rest or shall; 0: not a stage's last part")    \
+  X(int64_t, released, "1", "1 while the plates of a confinement are smooth")                                          \
   X(int64_t, stage_begun, "1", "1 once the stage has set itself up")                                                   \
   X(int64_t, force_evaluations, "1", "sweeps over the contacts that drove the motion")                                 \
   X(int64_t, refresh_step, "1", "step of the last refresh of the graph")                                               \

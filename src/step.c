@@ -81,11 +81,15 @@ static void drive_with_observed(tal_sim *sim) {
   }
 }
 
+double tal_step_plate_friction(const tal_sim *sim, const tal_scene_stage *plan) {
+  return isnan(plan->plate_friction) ? sim->friction : plan->plate_friction;
+}
+
 static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
   sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
   for (size_t w = 0; w < sim->walls.count; w++)
     if (sim->walls.wall[w].plate != 0)
-      sim->walls.wall[w].friction = isnan(plan->plate_friction) ? sim->friction : plan->plate_friction;
+      sim->walls.wall[w].friction = tal_step_plate_friction(sim, plan);
 }
 
 // The same in small steps.
@@ -201,19 +205,30 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   return TAL_OK;
 }
 
-static double largest_displacement_since_refresh(const tal_sim *sim) {
-  const tal_grains *g = &sim->grains;
+static double displacement_since_refresh(const tal_sim *sim, size_t i) {
+  return hypot(sim->grains.x[i] - sim->graph.x[i], sim->grains.y[i] - sim->graph.y[i]);
+}
+
+static double largest_displacement(const tal_sim *sim) {
   double largest = 0;
-  for (size_t i = 0; i < g->count; i++) {
-    double dx = g->x[i] - sim->graph.x[i], dy = g->y[i] - sim->graph.y[i];
-    largest = fmax(largest, dx * dx + dy * dy);
-  }
-  return sqrt(largest);
+  for (size_t i = 0; i < sim->grains.count; i++)
+    largest = fmax(largest, displacement_since_refresh(sim, i));
+  return largest;
+}
+
+static double displacement_of_loop(const tal_sim *sim) {
+  double largest = 0;
+  for (size_t k = 0; k < sim->graph.loop.count; k++)
+    largest = fmax(largest, displacement_since_refresh(sim, (size_t)sim->graph.loop.node[k]));
+  return largest;
 }
 
 static bool refresh_due(const tal_sim *sim) {
   const tal_scene_continuum *plan = &sim->scene->continuum;
+  const double diameter = 2 * sim->constants.mean_radius;
   int64_t steps = sim->run.step - sim->run.refresh_step;
+  if (sim->run.settling)
+    return steps % 10 == 0 && displacement_of_loop(sim) >= 0.25 * diameter;
   if (plan->refresh_steps > 0)
     return steps >= plan->refresh_steps;
   double strained =
@@ -224,7 +239,7 @@ static bool refresh_due(const tal_sim *sim) {
   double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;
   if (steps % 10 || (!isnan(plan->refresh_strain) && sim->run.strain_begun))
     return false;
-  return largest_displacement_since_refresh(sim) >= limit * 2 * sim->constants.mean_radius;
+  return largest_displacement(sim) >= limit * diameter;
 }
 
 tal_status tal_step_inspect(const tal_sim *sim, tal_error *err) {

@@ -14,14 +14,18 @@
 static const double pressure = 100e3, thickness = 1.5e-3;
 
 // A sample at rest under 100 kPa and its slow compression. Springs do not creep, so it comes to rest soon.
-static engine *sample(const char *more) {
+static engine *seeded(int seed, const char *more) {
   draft *d = draft_begin();
   fprintf(d->to,
-          "seed: 4\ngrains: {count: 250, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+          "seed: %d\ngrains: {count: 250, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
           "material: {young: 30e9, poisson: 0.3, density: 2675, friction: 0.45, damping: 0.002}\nmass_scaling: 1e5\n"
           "pack: {method: drop_and_roll, width: 22e-3}\nintegrator: {dt: 2e-5}\n%s",
-          more);
+          seed, more);
   return engine_start(d);
+}
+
+static engine *sample(const char *more) {
+  return seeded(4, more);
 }
 
 #define CONFINE "{kind: confine, pressure: 100e3, ramp: 0.5, friction: 0.1}"
@@ -127,12 +131,15 @@ static void identities(void **state) {
 
 // ---- the end of a confinement ----
 
-// Place on the loop of the outermost grain that touches a plate; side +1: bottom, direction -1: leftmost.
+// x of the outermost grain at a plate, less than a hundredth of a mean diameter away from it [method, (22)]; side
+// +1: bottom, direction -1: leftmost.
 static double outermost(const tal_sim *sim, int side, int direction) {
+  const tal_grains *g = &sim->grains;
+  const double y = tal_walls_plate(&sim->walls, side)->y0;
   double found = -(double)INFINITY;
-  for (size_t c = 0; c < sim->wall_contacts.count; c++)
-    if (sim->wall_contacts.overlap[c] > 0 && sim->walls.wall[sim->wall_contacts.j[c]].plate == side)
-      found = fmax(found, direction * sim->grains.x[sim->wall_contacts.i[c]]);
+  for (size_t i = 0; i < g->count; i++)
+    if (side * (g->y[i] - y) - g->r[i] < 0.01 * 2 * 0.75e-3)
+      found = fmax(found, direction * g->x[i]);
   return direction * found;
 }
 
@@ -144,8 +151,8 @@ static double mean_speed(const tal_grains *g) {
 }
 
 // The claims of end_of_confinement for one sample.
-static void check_confined(const char *more) {
-  engine *e = sample(more);
+static void check_confined(int seed, const char *more) {
+  engine *e = seeded(seed, more);
   engine_finish(e);
   tal_sim *sim = e->sim;
   tal_observed seen = tal_sim_driving(sim);
@@ -161,7 +168,7 @@ static void check_confined(const char *more) {
   if (!(fabs(stress.xx / pressure - 1) <= 0.01 && fabs(stress.yy / pressure - 1) <= 0.01))
     fail_msg("sigma_xx %.5g, sigma_yy %.5g Pa", stress.xx, stress.yy);
   double shear = 0.5 * (stress.xy + stress.yx);
-  if (!(fabs(shear) < 0.05 * pressure))
+  if (!(fabs(shear) < 0.01 * pressure))
     fail_msg("sigma_xy %.5g Pa in %s", shear, more);
   tal_macro macro;
   tal_macro_measure(&seen, &macro);
@@ -178,15 +185,18 @@ static void check_confined(const char *more) {
   engine_end(e);
 }
 
-// MODEL, for samples that come to rest and those that creep, explicit and implicit: at the end the stress, summed here
-// from the contacts, is 100 kPa within 1 % in both directions; each plate bears p h times the distance of the outermost
-// grains on it; nothing moves faster than the unbalanced force that is allowed would make it move within a ramp. The
-// rough plates may hold some shear: the pressed arcs need not be of one height.
+// MODEL, for samples that come to rest and those that creep, explicit and implicit, one whose loop keeps changing (seed
+// 2) and one that the plates' friction would hold 1.6 % off (the implicit one): at the end the stress, summed here
+// from the contacts, is 100 kPa within 1 % in both directions and holds no shear beyond 1 %; each plate bears p h times
+// the distance of the outermost grains on it; nothing moves faster than the unbalanced force that is allowed would make
+// it move within a ramp.
 static void end_of_confinement(void **state) {
   (void)state;
-  check_confined("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
-  check_confined("contact: {tangential: regularised, vR: 1e-5}\nstages: [" CONFINE "]\n");
-  check_confined("contact: {tangential: regularised, vR: 1e-5}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.5, "
+  for (int seed = 2; seed <= 4; seed += 2)
+    check_confined(seed, "contact: {tangential: spring}\nstages: [" CONFINE "]\n");
+  check_confined(4, "contact: {tangential: regularised, vR: 1e-5}\nstages: [" CONFINE "]\n");
+  check_confined(4,
+                 "contact: {tangential: regularised, vR: 1e-5}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.5, "
                  "friction: 0.1, integrator: {scheme: implicit_friction, dt: 1e-4}}]\n");
 }
 
