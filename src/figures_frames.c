@@ -99,6 +99,7 @@ static void read_grains(reading *in, tal_frame *frame) {
   frame->y = read_reals(in, "/grains", "/grains/y", n);
   frame->r = read_reals(in, "/grains", "/grains/r", n);
   frame->theta = read_reals(in, "/grains", "/grains/theta", n);
+  frame->omega = read_reals(in, "/grains", "/grains/omega", n);
 }
 
 // Contacts whose overlap is round-off of the coordinates (a packing that rests on nothing but geometry) carry forces
@@ -111,6 +112,7 @@ static void drop_hairs(tal_frame *frame, const double *overlap) {
       continue;
     frame->i[kept] = frame->i[c];
     frame->j[kept] = frame->j[c];
+    frame->ft[kept] = frame->ft[c];
     frame->fn[kept++] = frame->fn[c];
   }
   frame->contact_count = kept;
@@ -121,6 +123,7 @@ static void read_contacts(reading *in, tal_frame *frame) {
   frame->i = read_indices(in, "/contacts", "/contacts/i", n, frame->grain_count);
   frame->j = read_indices(in, "/contacts", "/contacts/j", n, frame->grain_count);
   frame->fn = read_reals(in, "/contacts", "/contacts/fn", n);
+  frame->ft = read_reals(in, "/contacts", "/contacts/ft", n);
   double *overlap = read_reals(in, "/contacts", "/contacts/overlap", n);
   if (!in->failed)
     drop_hairs(frame, overlap);
@@ -206,7 +209,8 @@ void tal_frame_clear(tal_frame *frame) {
   void *const owned[] = {frame->id,        frame->x,         frame->y,    frame->r,        frame->theta,
                          frame->i,         frame->j,         frame->fn,   frame->wall,     frame->corner[0],
                          frame->corner[1], frame->corner[2], frame->L_II, frame->pressure, frame->area,
-                         frame->loop,      frame->bx,        frame->by,   frame->br};
+                         frame->loop,      frame->bx,        frame->by,   frame->br,       frame->omega,
+                         frame->ft};
   for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
     free(owned[k]);
   *frame = (tal_frame){0};

@@ -2,6 +2,7 @@
 
 #include "critical.h"
 #include "effects.h"
+#include "forced.h"
 #include "forces.h"
 #include "integrate.h"
 #include "output.h"
@@ -63,7 +64,7 @@ typedef struct job {
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-enum { WARNINGS = 3, WARNING_SIZE = 200 };
+enum { WARNINGS = 4, WARNING_SIZE = 200 };
 
 // What the user should know about the accuracy of this run; count of sentences in `text`.
 static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
@@ -83,14 +84,15 @@ static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
         text[count++], WARNING_SIZE,
         "up to %lld grains at a time lay outside the boundary: nothing pressed on them until it reached them again",
         (long long)this->sim->run.outside_most);
-  return count;
+  tal_forced_warning(this->sim, text[count], WARNING_SIZE);
+  return count + (*text[count] != '\0');
 }
 
 static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
   char text[WARNINGS][WARNING_SIZE];
-  const char *const sentences[WARNINGS] = {text[0], text[1], text[2]};
+  const char *const sentences[WARNINGS] = {text[0], text[1], text[2], text[3]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
