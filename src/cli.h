@@ -19,6 +19,7 @@ int tal_cli_plot(int argc, char **argv);
 int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);
 int tal_cli_study(int argc, char **argv);
+int tal_cli_rotation(int argc, char **argv);
 
 typedef struct tal_command {
   const char *name;
@@ -42,7 +43,9 @@ typedef enum tal_cli_accept {
   TAL_CLI_RESUME = 8,   // --resume
   TAL_CLI_QUIET = 16,   // -q, --quiet
   TAL_CLI_FIGURES = 32, // --no-figures
-  TAL_CLI_STUDY = 64    // --plan, --merge
+  TAL_CLI_STUDY = 64,    // --plan, --merge
+  TAL_CLI_FROM = 128,    // --from DIR
+  TAL_CLI_ROTATION = 256 // --grain ID, --frame N, --reach D
 } tal_cli_accept;
 
 typedef struct tal_cli_options {
@@ -54,6 +57,10 @@ typedef struct tal_cli_options {
   bool resume, quiet;
   bool figures;     // true unless --no-figures
   bool plan, merge; // study: only write the plan, only merge
+  const char *from; // run: folder or checkpoint to begin from, NULL when not given
+  int64_t grain;    // rotation: -1 when not given
+  int64_t frame;    // rotation: -1 when not given: the last
+  double reach;     // rotation: [mean diameters], 10 when not given
 } tal_cli_options;
 
 // Parses the words after the command `name`, which accepts the options of `accepted` and needs exactly one argument,

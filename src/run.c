@@ -1,7 +1,9 @@
 #include "run.h"
 
+#include "checkpoint.h"
 #include "critical.h"
 #include "effects.h"
+#include "files.h"
 #include "forced.h"
 #include "forces.h"
 #include "integrate.h"
@@ -289,6 +291,33 @@ int tal_run_threads(size_t grains, int asked) {
   return threads;
 }
 
+tal_status tal_run_from(tal_sim *sim, const char *path, tal_error *err) {
+  char inside[TAL_PATH_SIZE];
+  tal_checkpoint_head head;
+  tal_run_files files;
+  tal_file_path(inside, path, "checkpoint.h5");
+  const char *file = tal_file_exists(inside) ? inside : path;
+  tal_status status = tal_checkpoint_peek(file, &head, err);
+  if (status)
+    return status;
+  tal_run_files_clear(&head.files);
+  tal_scene before = *sim->scene;
+  before.stage_count = head.run.stage_begun ? (size_t)head.run.stage + 1 : 0;
+  if (!head.complete)
+    return tal_fail(err, TAL_BAD_INPUT, "%s: that run is not finished; accepted: a finished run", file);
+  if (before.stage_count >= sim->scene->stage_count)
+    return tal_fail(err, TAL_BAD_INPUT, "%s: the scene has no stage beyond the %zu of that run; accepted: a further stage",
+                    file, before.stage_count);
+  char *text = tal_scene_text(&before);
+  status = tal_checkpoint_read(file, sim, text, &files, err);
+  free(text);
+  if (status)
+    return status;
+  tal_run_files_clear(&files);
+  tal_sim_restored(sim);
+  return TAL_OK;
+}
+
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err) {
   *result = (tal_run_result){0};
@@ -296,6 +325,8 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
   tal_status status = tal_sim_create(&run.sim, scene, err);
   if (status == TAL_OK)
     status = tal_output_check_tracks(scene, run.sim->grains.count, err);
+  if (status == TAL_OK && options->from && !options->resume)
+    status = tal_run_from(run.sim, options->from, err);
   if (status == TAL_OK)
     run.cores = tal_run_threads(run.sim->grains.count, options->threads);
   if (status == TAL_OK)
