@@ -16,7 +16,7 @@ static const tal_command commands[] = {
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
     {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
      "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},
-    {"rotation", "DIR [--grain ID] [--frame N] [--reach DIAMETERS] [--no-figures]",
+    {"rotation", "DIR [--grain ID] [--frame N] [--network N] [--since N] [--reach DIAMETERS] [--no-figures]",
      "how far the spin of forced grains reaches in the runs in and below DIR, and what force chains do to it",
      tal_cli_rotation},
     {"verify", "DIR", "check the files of a run against their checksums and each other", tal_cli_verify},
@@ -63,6 +63,11 @@ static const option_help table[] = {
     {TAL_CLI_FROM, {"from", required_argument, NULL, 'f'}, "DIR", "begin with the state in which the run in DIR ended"},
     {TAL_CLI_ROTATION, {"grain", required_argument, NULL, 'g'}, "ID", "the grain to look from, else the forced one"},
     {TAL_CLI_ROTATION, {"frame", required_argument, NULL, 'k'}, "N", "the field frame, else the last"},
+    {TAL_CLI_ROTATION, {"network", required_argument, NULL, 'w'}, "N", "the frame whose forces count, else the same"},
+    {TAL_CLI_ROTATION,
+     {"since", required_argument, NULL, 'i'},
+     "N",
+     "mean spins since that frame, not those of the instant"},
     {TAL_CLI_ROTATION, {"reach", required_argument, NULL, 'R'}, "D", "cutoff in mean diameters, 10 by default"},
     {0, {"help", no_argument, NULL, 'h'}, NULL, "this text"}};
 
@@ -149,6 +154,10 @@ static int take(tal_cli_options *options, const char *name, int letter, const ch
     return take_index(name, "--grain", value, &options->grain);
   case 'k':
     return take_index(name, "--frame", value, &options->frame);
+  case 'w':
+    return take_index(name, "--network", value, &options->network);
+  case 'i':
+    return take_index(name, "--since", value, &options->since);
   case 'R':
     return take_reach(options, name, value);
   default:
@@ -207,7 +216,7 @@ static bool take_all(tal_cli_options *options, const char *name, unsigned accept
 
 bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned accepted, const char *argument,
                            int argc, char **argv, int *exit_code) {
-  *options = (tal_cli_options){.figures = true, .grain = -1, .frame = -1, .reach = 10};
+  *options = (tal_cli_options){.figures = true, .grain = -1, .frame = -1, .network = -1, .since = -1, .reach = 10};
   *exit_code = TAL_OK;
   options->sets = tal_alloc((size_t)argc + 1, sizeof *options->sets);
   char **words = tal_alloc((size_t)argc + 2, sizeof *words); // getopt skips the first and reorders the rest

@@ -74,8 +74,7 @@ static int make_ensemble(const tal_scene *scene, const tal_cli_options *options,
   tal_error err = {""};
   tal_ensemble_result result;
   tal_status status = tal_program_path(program, sizeof program, &err);
-  const tal_ensemble_options how = {dir,      program, options->sets, options->set_count, options->threads,
-                                    options->quiet};
+  const tal_ensemble_options how = {dir, program, options->sets, options->set_count, options->threads, options->quiet};
   if (status == TAL_OK)
     status = tal_ensemble_run(scene, &how, &result, &err);
   if (status == TAL_INTERRUPTED)
@@ -102,9 +101,8 @@ static int run_all(const tal_scene *scene, const tal_cli_options *options, const
   tal_status status = many ? tal_ensemble_check(scene, &err) : TAL_OK;
   if (status == TAL_OK)
     status = tal_run_scene(&confined, &plan, &result, &err);
-  int exit_code = many && status == TAL_OK && result.already_done
-                      ? TAL_OK
-                      : finish(status, &result, options, dir, &err);
+  int exit_code =
+      many && status == TAL_OK && result.already_done ? TAL_OK : finish(status, &result, options, dir, &err);
   return many && exit_code == TAL_OK ? make_ensemble(scene, options, dir) : exit_code;
 }
 

@@ -9,12 +9,12 @@
 
 // Segments of the force network: contact c joins the centres of grains i[c] and j[c]. All borrowed.
 typedef struct tal_network {
-  const double *x, *y;   // [grains] centres [m]
-  const int64_t *i, *j;  // [contacts] grain indices
-  const double *f;       // [contacts] force carried [N], >= 0
+  const double *x, *y;  // [grains] centres [m]
+  const int64_t *i, *j; // [contacts] grain indices
+  const double *f;      // [contacts] force carried [N], >= 0
   size_t contacts;
-  double mean_force;     // <f> over all contacts of the assembly [N]
-  double diameter;       // mean diameter of the grains [m]: the unit of |s|
+  double mean_force; // <f> over all contacts of the assembly [N]
+  double diameter;   // mean diameter of the grains [m]: the unit of |s|
 } tal_network;
 
 // (R2): T over the segments whose middle lies within `reach` mean diameters of `from`. *segments (may be NULL): how
@@ -22,8 +22,9 @@ typedef struct tal_network {
 geo_tensor tal_directional_tensor(const tal_network *network, geo_vec from, double reach, size_t *segments);
 // Eigenvalues of Sym(T), the larger first, and unit eigenvectors with x > 0 (or x = 0, y > 0).
 void tal_directional_axes(geo_tensor tensor, double value[2], geo_vec axis[2]);
-// (R4), (R5) summed per sector of the direction of s: `count` equal sectors counter-clockwise from angle 0. along[count]:
-// W; across[count] (may be NULL): what segments that carry more than <f> contribute across that direction.
+// (R4), (R5) summed per sector of the direction of s: `count` equal sectors counter-clockwise from angle 0.
+// along[count]: W; across[count] (may be NULL): what segments that carry more than <f> contribute across that
+// direction.
 void tal_directional_rose(const tal_network *network, geo_vec from, double reach, size_t count, double *along,
                           double *across);
 // Sector of the direction (x, y).

@@ -64,8 +64,7 @@ static tal_status draw(const tal_scene *scene, const char *checkpoint, int64_t *
 static tal_status add_run(tal_study *study, const tal_scene *scene, int64_t id, tal_error *err) {
   tal_tree *tree = &study->tree;
   tal_study_setting *setting = &study->settings[study->setting_count++];
-  const char *key =
-      tal_words_format(tree, "stages.%zu.grain=%lld", scene->stage_count - 1, (long long)id);
+  const char *key = tal_words_format(tree, "stages.%zu.grain=%lld", scene->stage_count - 1, (long long)id);
   *setting = (tal_study_setting){.id = tal_words_format(tree, "grain-%lld", (long long)id),
                                  .label = tal_words_format(tree, "grain %lld", (long long)id),
                                  .value = {TAL_STUDY_OWN, TAL_STUDY_OWN},

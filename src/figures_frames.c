@@ -206,11 +206,10 @@ tal_status tal_frame_read(tal_frame *frame, const char *path, tal_error *err) {
 }
 
 void tal_frame_clear(tal_frame *frame) {
-  void *const owned[] = {frame->id,        frame->x,         frame->y,    frame->r,        frame->theta,
-                         frame->i,         frame->j,         frame->fn,   frame->wall,     frame->corner[0],
-                         frame->corner[1], frame->corner[2], frame->L_II, frame->pressure, frame->area,
-                         frame->loop,      frame->bx,        frame->by,   frame->br,       frame->omega,
-                         frame->ft};
+  void *const owned[] = {
+      frame->id,   frame->x,    frame->y,         frame->r,         frame->theta,     frame->i,     frame->j,
+      frame->fn,   frame->wall, frame->corner[0], frame->corner[1], frame->corner[2], frame->L_II,  frame->pressure,
+      frame->area, frame->loop, frame->bx,        frame->by,        frame->br,        frame->omega, frame->ft};
   for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
     free(owned[k]);
   *frame = (tal_frame){0};

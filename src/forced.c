@@ -184,8 +184,9 @@ void tal_forced_warning(const tal_sim *sim, char *text, size_t size) {
   int *touching = tal_alloc(sim->grains.count, sizeof *touching);
   tal_forced_contacts(sim, touching);
   if (touching[i] < 2)
-    snprintf(text, size, "the forced grain %lld is a rattler (%d contacts): there is next to nothing to transmit its spin",
-             id, touching[i]);
+    snprintf(text, size,
+             "the forced grain %lld is a rattler (%d contacts): there is next to nothing to transmit its spin", id,
+             touching[i]);
   else if (to_loop(sim, i) == 0)
     snprintf(text, size, "the forced grain %lld lies on the rim: grains surround it on one side only", id);
   free(touching);

@@ -306,8 +306,9 @@ tal_status tal_run_from(tal_sim *sim, const char *path, tal_error *err) {
   if (!head.complete)
     return tal_fail(err, TAL_BAD_INPUT, "%s: that run is not finished; accepted: a finished run", file);
   if (before.stage_count >= sim->scene->stage_count)
-    return tal_fail(err, TAL_BAD_INPUT, "%s: the scene has no stage beyond the %zu of that run; accepted: a further stage",
-                    file, before.stage_count);
+    return tal_fail(err, TAL_BAD_INPUT,
+                    "%s: the scene has no stage beyond the %zu of that run; accepted: a further stage", file,
+                    before.stage_count);
   char *text = tal_scene_text(&before);
   status = tal_checkpoint_read(file, sim, text, &files, err);
   free(text);

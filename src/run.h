@@ -5,10 +5,10 @@
 #include "sim.h"
 
 typedef struct tal_run_options {
-  const char *dir; // where the files go
-  int threads;     // 0: as many as there are
-  bool resume;     // go on from the checkpoint in dir
-  bool quiet;      // no progress line
+  const char *dir;  // where the files go
+  int threads;      // 0: as many as there are
+  bool resume;      // go on from the checkpoint in dir
+  bool quiet;       // no progress line
   const char *from; // a run's folder or checkpoint whose state is the start, NULL: the packing
 } tal_run_options;
 

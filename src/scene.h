@@ -118,7 +118,7 @@ typedef struct tal_scene_membrane {
 
 // Grains whose spin a stage imposes. None listed and random 0: the one nearest to the middle.
 typedef struct tal_scene_forced {
-  int64_t *ids;   // owned; [count]
+  int64_t *ids; // owned; [count]
   size_t count;
   int64_t random; // grains drawn for an ensemble
   double margin;  // [mean diameters] between them and the loop

@@ -363,7 +363,8 @@ static void check_spin(const stage_place *at, const tal_scene_stage *stage) {
     if (total && id >= total)
       wrong_stage(at, "grain", "%lld is no grain; accepted: ids from 0 to %lld", (long long)id, (long long)total - 1);
     else if (total && scene->grains.list_count && scene->grains.list[id].fixed)
-      wrong_stage(at, "grain", "%lld is a fixed grain: it keeps its spin; accepted: grains that are free", (long long)id);
+      wrong_stage(at, "grain", "%lld is a fixed grain: it keeps its spin; accepted: grains that are free",
+                  (long long)id);
   }
   if ((stage->grain.many || stage->grain.random) && at->index + 1 < scene->stage_count)
     wrong_stage(at, "grain", "forces many grains, each in a run of its own; accepted: in the last stage only");

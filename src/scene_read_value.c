@@ -213,7 +213,8 @@ static void read_pairs(tal_report *report, const tal_key *key, const tal_node *n
 
 static const tal_key forced_id = {.name = "", .type = TAL_KEY_WHOLE, .low = 0, .high = 1e8};
 static const tal_key forced_random = {.name = "random", .type = TAL_KEY_WHOLE, .low = 1, .high = 1e6};
-static const tal_key forced_margin = {.name = "margin", .type = TAL_KEY_REAL, .unit = "mean diameters", .high = HUGE_VAL};
+static const tal_key forced_margin = {
+    .name = "margin", .type = TAL_KEY_REAL, .unit = "mean diameters", .high = HUGE_VAL};
 
 static void read_drawn(tal_report *report, const tal_node *node, const tal_trail *at, tal_scene_forced *out) {
   for (const tal_node *child = node->child; child; child = child->next) {

@@ -58,7 +58,8 @@ static void target(const tal_sim *sim, const tal_scene_stage *plan, tal_boundary
 }
 
 const tal_stage tal_stage_spin = {.name = "spin",
-                                  .help = "one grain is turned, the assembly under pressure held from turning as a whole",
+                                  .help =
+                                      "one grain is turned, the assembly under pressure held from turning as a whole",
                                   .steps = steps,
                                   .begin = begin,
                                   .before_step = before_step,

@@ -41,7 +41,7 @@ typedef struct tal_sector_statistics {
   size_t sectors, grains, samples;
   tal_interval along, across;             // correlation of the transmission with either
   tal_interval along_slope, across_slope; // standardised regression (R11) on both at once
-  tal_interval open, blocked; // mean transmission where `across` is in its lowest and its highest quarter
+  tal_interval open, blocked;             // mean transmission where `across` is in its lowest and its highest quarter
 } tal_sector_statistics;
 
 // `confidence` in (0, 1). Sectors with a NAN are left out. Fewer than three grains give NAN intervals.

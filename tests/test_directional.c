@@ -52,10 +52,9 @@ static void about(sketch *s, double r, double angle, double tilt, double f) {
 
 static geo_tensor turned(geo_tensor t, double angle) {
   const double c = cos(angle), s = sin(angle);
-  return (geo_tensor){c * c * t.xx - c * s * (t.xy + t.yx) + s * s * t.yy,
-                      c * c * t.xy + c * s * (t.xx - t.yy) - s * s * t.yx,
-                      c * c * t.yx + c * s * (t.xx - t.yy) - s * s * t.xy,
-                      s * s * t.xx + c * s * (t.xy + t.yx) + c * c * t.yy};
+  return (geo_tensor){
+      c * c * t.xx - c * s * (t.xy + t.yx) + s * s * t.yy, c * c * t.xy + c * s * (t.xx - t.yy) - s * s * t.yx,
+      c * c * t.yx + c * s * (t.xx - t.yy) - s * s * t.xy, s * s * t.xx + c * s * (t.xy + t.yx) + c * c * t.yy};
 }
 
 static void assert_tensor(geo_tensor a, geo_tensor b, double eps) {
@@ -257,10 +256,9 @@ static void draw_sectors(gsl_rng *random, tal_sector *sector, size_t grains, dou
     for (size_t k = 0; k < 12; k++) {
       const double common = gsl_ran_gaussian(random, 0.3), across = 1 + common + gsl_ran_gaussian(random, 0.3);
       const double along = 1 + common + gsl_ran_gaussian(random, 0.3);
-      sector[12 * g + k] = (tal_sector){g / (grains / 5), g,
-                                        1 + a * (across - 1) + w * (along - 1) + shared +
-                                            gsl_ran_gaussian(random, 0.4),
-                                        along, across};
+      sector[12 * g + k] =
+          (tal_sector){g / (grains / 5), g,
+                       1 + a * (across - 1) + w * (along - 1) + shared + gsl_ran_gaussian(random, 0.4), along, across};
     }
   }
 }
@@ -309,10 +307,14 @@ static void transmission_of_sectors(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(all_radial),         cmocka_unit_test(all_tangential),
-      cmocka_unit_test(lattices),           cmocka_unit_test(rotation_and_scale),
-      cmocka_unit_test(nothing_there),      cmocka_unit_test(decay_of_a_curve),
-      cmocka_unit_test(decay_of_draws),     cmocka_unit_test(sectors_of_draws),
+      cmocka_unit_test(all_radial),
+      cmocka_unit_test(all_tangential),
+      cmocka_unit_test(lattices),
+      cmocka_unit_test(rotation_and_scale),
+      cmocka_unit_test(nothing_there),
+      cmocka_unit_test(decay_of_a_curve),
+      cmocka_unit_test(decay_of_draws),
+      cmocka_unit_test(sectors_of_draws),
       cmocka_unit_test(transmission_of_sectors),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
