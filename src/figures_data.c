@@ -175,6 +175,8 @@ static void facts_of_text(tal_run_facts *facts, const char *text, size_t size, i
     const yaml_node_t *root = yaml_document_get_root_node(&document);
     const yaml_node_t *scene = depth == 0 ? member(&document, root, "scene") : root;
     const char *inner = scalar(scene), *forced = depth == 0 ? scalar(member(&document, root, "forced_grain")) : NULL;
+    const char *status = depth == 0 ? scalar(member(&document, root, "status")) : NULL;
+    facts->done = facts->done || (status && strcmp(status, "done") == 0);
     if (forced)
       facts->forced_grain = strtoll(forced, NULL, 10);
     if (inner && depth == 0)

@@ -248,7 +248,7 @@ static void put_histogram(tal_plot *plot, const char *name, const subject *s, bo
   size_t bin[200] = {0};
   for (size_t g = 0; g < s->all->count; g++) {
     const double value = influence ? s->all->item[g].influence : s->all->item[g].decay.length;
-    if (value >= 0 && value / width < 199)
+    if ((influence || tal_rotation_transmits(&s->all->item[g])) && value >= 0 && value / width < 199)
       bin[(size_t)(value / width)]++;
   }
   FILE *data = tal_plot_data(plot, name);
@@ -298,7 +298,7 @@ static void put_tenths(tal_plot *plot, const char *name, const subject *s, bool 
     for (int k = 0; k < TAL_SECTORS; k++)
       mean += value[k] / TAL_SECTORS;
     for (int k = 0; k < TAL_SECTORS; k++)
-      if (isfinite(a->transmission[k]) && mean > 0)
+      if (isfinite(a->transmission[k]) && mean > 0 && tal_rotation_transmits(a))
         point[count++] = (pair){value[k] / mean, a->transmission[k]};
   }
   qsort(point, count, sizeof *point, by_x);

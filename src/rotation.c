@@ -21,7 +21,7 @@ static double mean_of(const double *value, size_t count) {
 static double *forces(const tal_frame *frame) {
   double *f = tal_alloc(frame->contact_count + 1, sizeof *f);
   for (size_t c = 0; c < frame->contact_count; c++)
-    f[c] = hypot(frame->fn[c], frame->ft[c]);
+    f[c] = isnan(frame->ft[c]) ? frame->fn[c] : hypot(frame->fn[c], frame->ft[c]);
   return f;
 }
 
@@ -111,14 +111,18 @@ static tal_status measure(tal_rotation *a, const tal_frame *frame, const tal_fra
   a->x = frame->x[self];
   a->y = frame->y[self];
   a->omega = frame->omega[self];
+  if (isnan(a->omega))
+    return tal_fail(err, TAL_BAD_INPUT, "%s: the frame has no spins", a->run);
   a->diameter = 2 * mean_of(frame->r, frame->grain_count);
   a->rim = distance_to_rim(a, frame);
   double *f = forces(frame), mean = mean_of(f, frame->contact_count);
   size_t *contacts = bearing_contacts(frame, f, mean);
   a->contacts = contacts[self];
-  double *g = forces(network);
-  look_at_network(a, network, g, mean_of(g, network->contact_count), (geo_vec){network->x[self], network->y[self]},
-                  options->reach);
+  double *g = forces(network), mean_there = mean_of(g, network->contact_count);
+  for (size_t c = 0; c < network->contact_count; c++)
+    if (network->i[c] == (int64_t)self || network->j[c] == (int64_t)self)
+      a->load += g[c] / mean_there;
+  look_at_network(a, network, g, mean_there, (geo_vec){network->x[self], network->y[self]}, options->reach);
   free(g);
   collect_points(a, frame, self, contacts);
   a->influence = (double)NAN;
@@ -221,14 +225,14 @@ static int by_name(const FTSENT **a, const FTSENT **b) {
 }
 
 // What an ensemble began from does not count among its runs.
-static bool forces_a_grain(const char *dir) {
+static bool forced_a_grain(const char *dir) {
   char runs[TAL_PATH_SIZE];
   tal_file_path(runs, dir, "runs");
   if (tal_file_exists(runs))
     return false;
   tal_run_facts facts;
   tal_run_facts_read(&facts, dir);
-  const bool forced = facts.forced_grain >= 0;
+  const bool forced = facts.done && facts.forced_grain >= 0;
   tal_run_facts_clear(&facts);
   return forced;
 }
@@ -269,7 +273,7 @@ static tal_status find_all(tal_rotations *all, const char *dir, const tal_rotati
       continue;
     char *folder = tal_strdup(entry->fts_path);
     *strrchr(folder, '/') = '\0';
-    if (forces_a_grain(folder))
+    if (forced_a_grain(folder))
       status = add(all, folder, options, err);
     free(folder);
   }
@@ -288,36 +292,60 @@ static double mean_over_sectors(const double value[TAL_SECTORS]) {
   return mean_of(value, TAL_SECTORS);
 }
 
-static void sum_up(tal_rotations *all) {
+// Means over the forced grains with the intervals of (R12). What is NAN does not count.
+static void average(tal_rotations *all) {
   const size_t n = all->count;
-  double *length = tal_alloc(n, sizeof *length), *influence = tal_alloc(n, sizeof *influence);
-  size_t *sample = tal_alloc(n, sizeof *sample), fitted = 0;
-  tal_sector *sector = tal_alloc(n * TAL_SECTORS, sizeof *sector);
+  double *value[5];
+  size_t *sample = tal_alloc(n, sizeof *sample);
+  tal_interval *const into[5] = {&all->share, &all->load, &all->load_others, &all->length, &all->influence};
+  for (int k = 0; k < 5; k++)
+    value[k] = tal_alloc(n, sizeof(double));
   for (size_t g = 0; g < n; g++) {
     const tal_rotation *a = &all->item[g];
-    length[g] = a->decay.length;
-    influence[g] = a->influence;
+    const bool transmits = tal_rotation_transmits(a);
+    const double none = (double)NAN;
     sample[g] = a->sample;
+    all->transmitting += transmits;
+    value[0][g] = transmits;
+    value[1][g] = transmits ? a->load : none;
+    value[2][g] = transmits ? none : a->load;
+    value[3][g] = transmits ? a->decay.length : none;
+    value[4][g] = transmits ? a->influence : none;
+  }
+  for (int k = 0; k < 5; k++) {
+    *into[k] = tal_mean_interval(value[k], sample, n, all->confidence, 1);
+    free(value[k]);
+  }
+  free(sample);
+}
+
+static void compare_sectors(tal_rotations *all) {
+  tal_sector *sector = tal_alloc(all->count * TAL_SECTORS, sizeof *sector);
+  for (size_t g = 0; g < all->count; g++) {
+    const tal_rotation *a = &all->item[g];
     for (size_t k = 0; k < TAL_SECTORS; k++)
       sector[g * TAL_SECTORS + k] =
-          (tal_sector){a->sample, g, a->transmission[k], a->along[k] / mean_over_sectors(a->along),
-                       a->across[k] / mean_over_sectors(a->across)};
+          (tal_sector){a->sample, g, tal_rotation_transmits(a) ? a->transmission[k] : (double)NAN,
+                       a->along[k] / mean_over_sectors(a->along), a->across[k] / mean_over_sectors(a->across)};
   }
-  all->length = tal_mean_interval(length, sample, n, all->confidence, 1);
-  all->influence = tal_mean_interval(influence, sample, n, all->confidence, 1);
-  tal_sector_statistics_of(sector, n * TAL_SECTORS, all->confidence, 1, &all->sectors);
-  for (size_t g = 0; g < n; g++)
-    if (isfinite(length[g]))
-      length[fitted++] = length[g];
-  qsort(length, fitted, sizeof *length, ascending);
+  tal_sector_statistics_of(sector, all->count * TAL_SECTORS, all->confidence, 1, &all->sectors);
+  free(sector);
+}
+
+static void sum_up(tal_rotations *all) {
+  double *length = tal_alloc(all->count, sizeof *length);
   const double none = (double)NAN;
+  size_t fitted = 0;
+  average(all);
+  compare_sectors(all);
+  for (size_t g = 0; g < all->count; g++)
+    if (tal_rotation_transmits(&all->item[g]) && all->item[g].decay.points)
+      length[fitted++] = all->item[g].decay.length;
+  qsort(length, fitted, sizeof *length, ascending);
   all->length_low = fitted ? gsl_stats_quantile_from_sorted_data(length, 1, fitted, 0.05) : none;
   all->length_median = fitted ? gsl_stats_quantile_from_sorted_data(length, 1, fitted, 0.5) : none;
   all->length_high = fitted ? gsl_stats_quantile_from_sorted_data(length, 1, fitted, 0.95) : none;
   free(length);
-  free(influence);
-  free(sample);
-  free(sector);
 }
 
 tal_status tal_rotations_read(tal_rotations *all, const char *dir, const tal_rotation_options *options,

@@ -30,6 +30,7 @@ typedef struct tal_rotation {
   double diameter;           // [m] mean
   double rim;                // [mean diameters] to the nearest grain of the loop; NAN without a loop
   size_t contacts;           // of the grain
+  double load;               // sum of the forces on its contacts over <f>, in the network looked at
   size_t rattlers;           // of the assembly: grains with fewer than two contacts, left out below
   size_t points;             // all other grains that bear
   double *r, *angle, *ratio; // owned; [points] |omega| over that of the forced grain
@@ -50,11 +51,19 @@ tal_status tal_rotation_read(tal_rotation *rotation, const char *dir, const tal_
                              tal_frame *frame, tal_error *err);
 void tal_rotation_clear(tal_rotation *rotation);
 
+// Does its spin reach any other grain (R9)? One that slips on all its contacts has no decay length to speak of.
+static inline bool tal_rotation_transmits(const tal_rotation *rotation) {
+  return rotation->influence > 0;
+}
+
 typedef struct tal_rotations {
   size_t count, samples;
-  tal_rotation *item;                            // owned; sample by sample
-  double confidence;                             // of all intervals
-  tal_interval length, influence;                // means over the forced grains [mean diameters]
+  tal_rotation *item; // owned; sample by sample
+  double confidence;  // of all intervals
+  size_t transmitting;
+  tal_interval share;                            // of the forced grains that transmit
+  tal_interval load, load_others;                // mean load of those that do and of those that do not
+  tal_interval length, influence;                // means over those that do [mean diameters]
   double length_low, length_median, length_high; // quantiles 5, 50, 95 %
   tal_sector_statistics sectors;
 } tal_rotations;

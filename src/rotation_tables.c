@@ -30,13 +30,13 @@ static void put(FILE *out, size_t count, ...) {
 }
 
 static void forced(FILE *out, const tal_rotations *all) {
-  fputs("sample,grain,contacts,x[m],y[m],omega[rad/s],rim,segments,T_xx,T_xy,T_yx,T_yy,T_major,T_minor,axis[deg],"
+  fputs("sample,grain,contacts,load,x[m],y[m],omega[rad/s],rim,segments,T_xx,T_xy,T_yx,T_yy,T_major,T_minor,axis[deg],"
         "amplitude,amplitude_error,length,length_error,influence\n",
         out);
   for (size_t g = 0; g < all->count; g++) {
     const tal_rotation *a = &all->item[g];
     fprintf(out, "%zu,%lld,%zu", a->sample, (long long)a->grain, a->contacts);
-    put(out, 17, a->x, a->y, a->omega, a->rim, (double)a->segments, a->tensor.xx, a->tensor.xy, a->tensor.yx,
+    put(out, 18, a->load, a->x, a->y, a->omega, a->rim, (double)a->segments, a->tensor.xx, a->tensor.xy, a->tensor.yx,
         a->tensor.yy, a->value[0], a->value[1], degrees(a->axis[0]), a->decay.amplitude, a->decay.amplitude_error,
         a->decay.length, a->decay.length_error, a->influence);
   }
@@ -116,8 +116,8 @@ static void say_interval(FILE *out, const char *what, tal_interval i, const char
 }
 
 static void say_one(FILE *out, const tal_rotation *a, double reach) {
-  fprintf(out, "%s: grain %lld at (%.4g, %.4g) mm, %zu contacts, t = %.4g s\n", a->run, (long long)a->grain, 1e3 * a->x,
-          1e3 * a->y, a->contacts, a->time);
+  fprintf(out, "%s: grain %lld at (%.4g, %.4g) mm, %zu contacts that bear %.3g of <f>, t = %.4g s\n", a->run,
+          (long long)a->grain, 1e3 * a->x, 1e3 * a->y, a->contacts, a->load, a->time);
   fprintf(out, "  T  [%.4g %.4g; %.4g %.4g] of %zu segments within %g mean diameters\n", a->tensor.xx, a->tensor.xy,
           a->tensor.yx, a->tensor.yy, a->segments, reach);
   fprintf(out, "  Sym(T)  %.4g along %.1f deg, %.4g across\n", a->value[0], degrees(a->axis[0]), a->value[1]);
@@ -129,6 +129,8 @@ static void say_one(FILE *out, const tal_rotation *a, double reach) {
     fprintf(out, "  the grain is a rattler: there is nothing that could transmit its spin\n");
   if (!a->forced || a->omega == 0)
     return;
+  if (!tal_rotation_transmits(a))
+    fprintf(out, "  no other grain reaches %.0f %%: it slips on all its contacts\n", 100 * TAL_INFLUENCE);
   if (a->decay.points)
     fprintf(out, "  |omega|/omega0 = %.3f exp(-r/l), l = %.3f +- %.3f mean diameters, %zu grains within %g\n",
             a->decay.amplitude, a->decay.length, a->decay.length_error, a->decay.points, reach);
@@ -141,10 +143,14 @@ static void say_all(FILE *out, const tal_rotations *all, double reach) {
   const tal_sector_statistics *s = &all->sectors;
   fprintf(out, "%zu forced grains in %zu samples, cutoff %g mean diameters; intervals of %.0f %%\n", all->count,
           all->samples, reach, 100 * all->confidence);
+  say_interval(out, "share that transmits (5 %)", all->share, "");
+  say_interval(out, "load on those, of <f>", all->load, "");
+  say_interval(out, "load on the others", all->load_others, "");
+  fprintf(out, "the %zu that transmit:\n", all->transmitting);
   say_interval(out, "decay length, mean", all->length, " mean diameters");
   fprintf(out, "  %-34s %8.3f  [%.3f, %.3f]\n", "decay length, median and 5-95 %", all->length_median, all->length_low,
           all->length_high);
-  say_interval(out, "influence radius (5 %), mean", all->influence, " mean diameters");
+  say_interval(out, "influence radius, mean", all->influence, " mean diameters");
   fprintf(out, "transmission of %zu sectors of %d degrees\n", s->sectors, 360 / TAL_SECTORS);
   say_interval(out, "correlation with W", s->along, "");
   say_interval(out, "correlation with chains across", s->across, "");
