@@ -14,7 +14,7 @@ run() { # folder, settings...
   shift
   resume=
   if [ -e "$folder/checkpoint.h5" ]; then resume=--resume; fi
-  "$talus" run "$scene" -o "$folder" $resume -q --no-figures --set output.fields_every=1 "$@"
+  "$talus" run "$scene" -t 1 -o "$folder" $resume -q --no-figures --set output.fields_every=1 "$@"
 }
 
 I='stages.1.integrator={scheme: verlet, dt: 1e-5}'
