@@ -323,7 +323,8 @@ static void draw_sectors(const subject *s, tal_plot *plot) {
   fprintf(
       plot->script,
       "set xlabel 'strength of the sector over the mean of the grain'\nset ylabel 'transmission of the sector (mean "
-      "1)'\nset border 3 lw 2 lc rgb '#606060'\nset tics nomirror out\nset key outside top center vertical\nset xrange [0:*]\n"
+      "1)'\nset border 3 lw 2 lc rgb '#606060'\nset tics nomirror out\nset key outside top center vertical\n"
+      "set xrange [0:*]\n"
       "set arrow 1 from graph 0, first 1 to graph 1, first 1 nohead dt 2 lw 2 lc rgb '#909090'\n");
   put_tenths(plot, "along", s, false);
   put_tenths(plot, "across", s, true);
