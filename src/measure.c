@@ -9,6 +9,7 @@
 static const tal_measurement *const measurements[] = {
     &tal_measurement_tensors, //
     &tal_measurement_forces,  //
+    &tal_measurement_chains,  //
 };
 enum { MEASUREMENTS = sizeof measurements / sizeof *measurements };
 

@@ -30,7 +30,7 @@ typedef struct tal_measurement {
   void (*finish)(void *state, tal_measuring *run); // also frees the state
 } tal_measurement;
 
-extern const tal_measurement tal_measurement_tensors, tal_measurement_forces;
+extern const tal_measurement tal_measurement_tensors, tal_measurement_forces, tal_measurement_chains;
 
 // Begins a row: frame, time, axial strain.
 void tal_measuring_row(const tal_measuring *run, const tal_part *part, FILE *table);
