@@ -10,6 +10,7 @@ static const tal_measurement *const measurements[] = {
     &tal_measurement_tensors, //
     &tal_measurement_forces,  //
     &tal_measurement_chains,  //
+    &tal_measurement_voids,   //
 };
 enum { MEASUREMENTS = sizeof measurements / sizeof *measurements };
 

@@ -10,6 +10,7 @@
 #include "measure_forces.h"
 #include "measure_snapshot.h"
 #include "measure_tensors.h"
+#include "measure_voids.h"
 #include <stdbool.h>
 
 typedef struct tal_measure_options {

@@ -30,7 +30,8 @@ typedef struct tal_measurement {
   void (*finish)(void *state, tal_measuring *run); // also frees the state
 } tal_measurement;
 
-extern const tal_measurement tal_measurement_tensors, tal_measurement_forces, tal_measurement_chains;
+extern const tal_measurement tal_measurement_tensors, tal_measurement_forces, tal_measurement_chains,
+    tal_measurement_voids;
 
 // Begins a row: frame, time, axial strain.
 void tal_measuring_row(const tal_measuring *run, const tal_part *part, FILE *table);

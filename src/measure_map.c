@@ -95,3 +95,17 @@ void tal_measure_map_contacts(tal_measure_map *m, const tal_snapshot *s, const i
             width * ((double)class + 0.5) / 4, colour);
   }
 }
+
+void tal_measure_map_cells(tal_measure_map *m, const tal_snapshot *s, const double *value) {
+  FILE *data = tal_plot_data(&m->plot, "cells");
+  for (size_t t = 0; data && t < s->cell_count; t++) {
+    if (!isfinite(value[t]))
+      continue;
+    for (int k = 0; k < 3; k++)
+      fprintf(data, "%.9g %.9g %.5g\n", 1e3 * s->x[s->corner[t][k]], 1e3 * s->y[s->corner[t][k]], value[t]);
+    fputc('\n', data);
+  }
+  tal_plot_data_end(&m->plot, data);
+  tal_plot_element(&m->plot);
+  fputs("'cells' using 1:2:3 with filledcurves closed fs solid noborder fc palette", m->plot.script);
+}

@@ -24,6 +24,8 @@ void tal_measure_map_end(tal_measure_map *m, tal_measuring *run, const char *nam
 void tal_measure_map_discs(tal_measure_map *m, const tal_snapshot *s);
 void tal_measure_map_contacts(tal_measure_map *m, const tal_snapshot *s, const int32_t *contact, size_t count,
                               double mean, double width, const char *name, const char *colour);
+// Cells filled by value[cell_count] with the palette; NAN leaves a cell out.
+void tal_measure_map_cells(tal_measure_map *m, const tal_snapshot *s, const double *value);
 
 // A figure that is no map: begin with tal_plot_begin on run->out; this ends it as OUT/name.png and tells.
 void tal_measure_plot_end(tal_plot *plot, tal_measuring *run, const char *name);

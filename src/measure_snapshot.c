@@ -209,7 +209,7 @@ static void select_cells(tal_part *part, const tal_region *region) {
 }
 
 void tal_part_select(tal_part *part, const tal_snapshot *snapshot, const tal_region *region) {
-  *part = (tal_part){.of = snapshot};
+  *part = (tal_part){.of = snapshot, .region = *region};
   select_grains(part, region);
   select_contacts(part, region);
   select_cells(part, region);

@@ -69,7 +69,8 @@ bool tal_region_has(const tal_region *region, double x, double y);
 // What of a snapshot lies in a region: grains by centre, contacts by contact point, cells by centroid.
 typedef struct tal_part {
   const tal_snapshot *of; // borrowed
-  bool *grain;            // owned; [grain_count]
+  tal_region region;
+  bool *grain; // owned; [grain_count]
   size_t grain_count, contact_count, cell_count;
   int32_t *contact;     // owned; [contact_count] indices, ascending
   int32_t *cell;        // owned; [cell_count] indices, ascending
