@@ -11,6 +11,7 @@ static const tal_measurement *const measurements[] = {
     &tal_measurement_forces,  //
     &tal_measurement_chains,  //
     &tal_measurement_voids,   //
+    &tal_measurement_bands,   //
 };
 enum { MEASUREMENTS = sizeof measurements / sizeof *measurements };
 

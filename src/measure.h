@@ -5,9 +5,11 @@
 #define TAL_MEASURE_H
 
 #include "base.h"
+#include "measure_bands.h"
 #include "measure_chain_lives.h"
 #include "measure_chains.h"
 #include "measure_forces.h"
+#include "measure_motion.h"
 #include "measure_snapshot.h"
 #include "measure_tensors.h"
 #include "measure_voids.h"
