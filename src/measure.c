@@ -12,6 +12,7 @@ static const tal_measurement *const measurements[] = {
     &tal_measurement_chains,  //
     &tal_measurement_voids,   //
     &tal_measurement_bands,   //
+    &tal_measurement_export,  //
 };
 enum { MEASUREMENTS = sizeof measurements / sizeof *measurements };
 
@@ -56,8 +57,19 @@ static tal_status measure_all(tal_measuring *run, tal_measure_counts *counts, ta
   return status;
 }
 
+// Before anything is written: the fields of --export are there in the frames that they are wanted of.
+static tal_status check_exports(const tal_measuring *run, tal_error *err) {
+  tal_status status = TAL_OK;
+  for (size_t k = 0; k < run->choice.frames.count; k++)
+    for (size_t e = 0; run->choice.detail[k] && e < run->options->export_count && !status; e++)
+      status = tal_frame_has(run->choice.frames.entry[k].path, run->options->exports[e], err);
+  return status;
+}
+
 static tal_status work(tal_measuring *run, tal_measure_counts *counts, tal_error *err) {
-  tal_status status = tal_folder_create(run->out, err);
+  tal_status status = check_exports(run, err);
+  if (!status)
+    status = tal_folder_create(run->out, err);
   if (!status)
     status = measure_all(run, counts, err);
   if (!status)

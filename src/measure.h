@@ -8,6 +8,7 @@
 #include "measure_bands.h"
 #include "measure_chain_lives.h"
 #include "measure_chains.h"
+#include "measure_export.h"
 #include "measure_forces.h"
 #include "measure_motion.h"
 #include "measure_snapshot.h"

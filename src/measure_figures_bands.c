@@ -119,7 +119,8 @@ static bool begin_curves(tal_plot *plot, tal_measuring *run, const char *title, 
           "samples 1000\nset title ",
           x, y);
   tal_plot_text(plot->script, run->name, 40);
-  fprintf(plot->script, " noenhanced offset 0,1.2\nset label 1 '%s' at graph 0.5, graph 1.03 center font ',18'\n", title);
+  fprintf(plot->script, " noenhanced offset 0,1.2\nset label 1 '%s' at graph 0.5, graph 1.03 center font ',18'\n",
+          title);
   return true;
 }
 

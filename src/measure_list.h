@@ -31,7 +31,7 @@ typedef struct tal_measurement {
 } tal_measurement;
 
 extern const tal_measurement tal_measurement_tensors, tal_measurement_forces, tal_measurement_chains,
-    tal_measurement_voids, tal_measurement_bands;
+    tal_measurement_voids, tal_measurement_bands, tal_measurement_export;
 
 // Begins a row: frame, time, axial strain.
 void tal_measuring_row(const tal_measuring *run, const tal_part *part, FILE *table);

@@ -181,10 +181,32 @@ static void test_refusals(void **state) {
       {{"measure", "out", "--region", "1:2"}, "--region: '1:2' is no region"},
       {{"measure", "out", "--angle", "95"}, "--angle: '95' is out of range"},
       {{"measure", "out", "--over", "-1"}, "--over: '-1' is out of range"},
+      {{"measure", "out", "--export", "contact"}, "accepted: cells, contacts, grains, loop"},
+      {{"measure", "out", "--export", "grains/z"}, "--export: there is no field 'grains/z'; accepted: fx, fy, id,"},
       {{"measure", "out", "--threads", "2"}, "--threads: is not an option here"},
   };
   for (size_t k = 0; k < sizeof bad / sizeof *bad; k++)
     assert_refused(p, bad[k].words[3] ? bad[k].words[3] : "", bad[k].words, 2, bad[k].message);
+}
+
+// EXACT: exported numbers read back to the bits of the lattice; a group is one row per member, tables column by column.
+static void test_export(void **state) {
+  program *p = *state;
+  run_lattice(p, "out", "square", 3, 3, "-1e-6");
+  measure(p, WORDS("measure", "out", "--export", "grains/x", "--export", "cells", "--at", "all", "--no-figures"));
+  size_t size;
+  char *text = program_read(p, "out/measure/grains-x-000000.csv", &size);
+  assert_non_null(text);
+  assert_int_equal(strncmp(text, "x[m]\n", 5), 0);
+  assert_int_equal(count_lines(text), 10);
+  free(text);
+  text = program_read(p, "out/measure/cells-000000.csv", &size);
+  assert_int_equal(count_lines(text), 1 + 8);
+  assert_non_null(strstr(text, "L_xx[1/s],L_xy[1/s],L_yx[1/s],L_yy[1/s]"));
+  assert_non_null(strstr(text, "strain_xx,strain_xy,strain_yy"));
+  assert_non_null(strstr(text, "corner_0,corner_1,corner_2"));
+  free(text);
+  assert_near(cell_of(p, "out/measure/cells-000000.csv", "area[m^2]", 0, ","), 0.5 * 1.999e-3 * 1.999e-3, 1e-15);
 }
 
 // EXACT: a flipped byte in a frame is found before anything is written.
@@ -207,8 +229,11 @@ static void test_damaged_frame(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      program_test(test_agrees_with_the_series), program_test(test_no_contacts),
-      program_test(test_empty_regions),          program_test(test_refusals),
+      program_test(test_agrees_with_the_series),
+      program_test(test_no_contacts),
+      program_test(test_empty_regions),
+      program_test(test_refusals),
+      program_test(test_export),
       program_test(test_damaged_frame),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
