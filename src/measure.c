@@ -30,6 +30,8 @@ static tal_status measure_frame(tal_measuring *run, void *const state[], tal_mea
     return status;
   tal_part_select(&part, &snapshot, &run->options->region);
   run->detail = run->choice.detail[run->frame];
+  // Measurements share nothing but the list of tables. Those of a frame of --at read and draw: one after the other.
+#pragma omp parallel for schedule(dynamic) if (!run->detail)
   for (size_t m = 0; m < MEASUREMENTS; m++)
     measurements[m]->frame(state[m], run, &part);
   *counts = (tal_measure_counts){counts->frames + 1, part.grain_count, part.contact_count};

@@ -208,11 +208,39 @@ static tal_band band_of(const tal_field *scaled, const tal_fit *fit, const doubl
   band.base = p[BASE] * scale;
   band.height = p[HEIGHT] * scale;
   band.height_error = error[HEIGHT] * scale;
-  band.explained = fmax(0, 1 - fit->residual * scale * scale / (middle.variance * middle.weight));
+  const summary fitted = summarise(scaled);
+  band.explained = fmax(0, 1 - fit->residual / (fitted.variance * fitted.weight));
   band.concentration = concentration(scaled, fit);
   band.found = p[HEIGHT] > 2 * error[HEIGHT] && band.width < 0.5 * (range[1] - range[0]) * diameter &&
                p[PLACE] > range[0] && p[PLACE] < range[1];
   return band;
+}
+
+// Points merged into square boxes, about `most` of them, so that the fit's cost does not grow with the sample.
+static void merge(tal_field *field, double most) {
+  double x[2], y[2];
+  strip_range(field, 0, x);
+  strip_range(field, TAL_PI / 2, y);
+  const double side = sqrt((x[1] - x[0]) * (y[1] - y[0]) / most);
+  if ((double)field->count <= most || !(side > 0))
+    return;
+  const size_t columns = (size_t)((x[1] - x[0]) / side) + 1, rows = (size_t)((y[1] - y[0]) / side) + 1;
+  tal_field boxes = tal_field_create(columns * rows);
+  for (size_t k = 0; k < field->count; k++) {
+    const double w = field->weight[k];
+    const size_t b = (size_t)((field->y[k] - y[0]) / side) * columns + (size_t)((field->x[k] - x[0]) / side);
+    const size_t at = b < columns * rows ? b : columns * rows - 1;
+    boxes.weight[at] += w;
+    boxes.x[at] += w * field->x[k];
+    boxes.y[at] += w * field->y[k];
+    boxes.value[at] += w * field->value[k];
+  }
+  for (size_t b = 0; b < columns * rows; b++)
+    if (boxes.weight[b] > 0)
+      tal_field_add(&boxes, boxes.x[b] / boxes.weight[b], boxes.y[b] / boxes.weight[b],
+                    boxes.value[b] / boxes.weight[b], boxes.weight[b]);
+  tal_field_clear(field);
+  *field = boxes;
 }
 
 tal_band tal_band_fit(const tal_field *field, double diameter) {
@@ -225,6 +253,8 @@ tal_band tal_band_fit(const tal_field *field, double diameter) {
   for (size_t k = 0; k < field->count; k++)
     tal_field_add(&scaled, (field->x[k] - middle.x) / diameter, (field->y[k] - middle.y) / diameter,
                   field->value[k] / scale, field->weight[k]);
+  enum { MOST = 5000 };
+  merge(&scaled, MOST);
   double start[PARAMETERS] = {0}, error[PARAMETERS];
   scan(&scaled, start);
   const tal_fit fit = solve(&scaled, start);

@@ -26,7 +26,8 @@ typedef struct tal_band {
   double explained;     // share of the field's weighted variance
   double concentration; // share of the field's integral within the width over the share of area there
 } tal_band;
-// diameter [m]: mean diameter, the finest scale looked at. All 0 when there are fewer than 30 points or no variance.
+// More than 5000 points are first merged into so many boxes. diameter [m]: mean diameter, the finest scale looked at.
+// All 0 when there are fewer than 30 points or no variance.
 tal_band tal_band_fit(const tal_field *field, double diameter);
 
 // Means over strips across a direction.

@@ -12,7 +12,7 @@ typedef struct tal_one_table {
   size_t size;
 } one_table;
 
-FILE *tal_tables_get(tal_tables *tables, const char *name, const char *header) {
+static FILE *get(tal_tables *tables, const char *name, const char *header) {
   for (size_t k = 0; k < tables->count; k++)
     if (strcmp(tables->table[k]->name, name) == 0)
       return tables->table[k]->out;
@@ -25,6 +25,13 @@ FILE *tal_tables_get(tal_tables *tables, const char *name, const char *header) {
   return table->out;
 }
 
+FILE *tal_tables_get(tal_tables *tables, const char *name, const char *header) {
+  FILE *out;
+#pragma omp critical(tal_tables)
+  out = get(tables, name, header);
+  return out;
+}
+
 void tal_put(FILE *table, double value) {
   fprintf(table, ",%.12g", value);
 }
@@ -33,9 +40,15 @@ void tal_put_symmetric(FILE *table, double xx, double xy, double yx, double yy) 
   fprintf(table, ",%.12g,%.12g,%.12g", xx, (xy + yx) / 2, yy);
 }
 
+static int by_name(const void *a, const void *b) {
+  return strcmp((*(one_table *const *)a)->name, (*(one_table *const *)b)->name);
+}
+
 tal_status tal_tables_save(tal_tables *tables, const char *folder, void (*made)(void *user, const char *path),
                            void *user, tal_error *err) {
   tal_status status = TAL_OK;
+  if (tables->count)
+    qsort(tables->table, tables->count, sizeof *tables->table, by_name);
   for (size_t k = 0; k < tables->count && !status; k++) {
     one_table *table = tables->table[k];
     char path[TAL_PATH_SIZE];
