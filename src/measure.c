@@ -3,6 +3,7 @@
 
 #include "figures_data.h"
 #include "files.h"
+#include "measure_figures.h"
 #include "measure_list.h"
 #include <stdlib.h>
 
@@ -78,6 +79,8 @@ static tal_status work(tal_measuring *run, tal_measure_counts *counts, tal_error
     status = tal_tables_save(&run->tables, run->out, run->options->made, run->options->user, err);
   else
     tal_tables_clear(&run->tables);
+  if (!status && run->options->figures && counts->contacts)
+    tal_measure_curves_draw(run);
   if (!status && run->status)
     status = tal_fail(err, run->status, "%s", run->err.text);
   return status;

@@ -4,6 +4,8 @@
 #include "measure_fit.h"
 #include "store.h"
 #include <gsl/gsl_multifit.h>
+#include <gsl/gsl_sort.h>
+#include <gsl/gsl_statistics_double.h>
 #include <math.h>
 #include <stdlib.h>
 
@@ -49,7 +51,6 @@ void tal_earlier_clear(tal_earlier *earlier) {
 
 static void match_grains(tal_motion *m, const tal_part *part, const tal_earlier *e) {
   const tal_snapshot *s = part->of;
-  double square = 0;
   for (size_t k = 0, at = 0; k < s->grain_count; k++) {
     while (at < e->count && e->id[at] < s->id[k])
       at++;
@@ -60,15 +61,29 @@ static void match_grains(tal_motion *m, const tal_part *part, const tal_earlier 
     m->dtheta[k] = s->theta[k] - e->theta[at];
     m->matched[k] = true;
     m->known[k] = part->grain[k];
+    m->known_count += m->known[k];
+  }
+}
+
+static void cap_rotations(tal_motion *m, size_t count) {
+  double *size = tal_alloc(m->known_count, sizeof *size), square = 0;
+  size_t n = 0;
+  for (size_t k = 0; k < count; k++)
+    if (m->known[k])
+      size[n++] = fabs(m->dtheta[k]);
+  if (n)
+    gsl_sort(size, 1, n);
+  const double cap = n ? gsl_stats_quantile_from_sorted_data(size, 1, n, 0.98) : 0;
+  m->median_rotation = n ? gsl_stats_median_from_sorted_data(size, 1, n) : 0;
+  for (size_t k = 0; k < count; k++) {
+    m->turn[k] = copysign(fmin(cap, fabs(m->dtheta[k])), m->dtheta[k]);
     if (!m->known[k])
       continue;
-    m->known_count++;
-    m->mean_rotation += m->dtheta[k];
-    square += m->dtheta[k] * m->dtheta[k];
+    m->mean_rotation += m->turn[k] / (double)n;
+    square += m->turn[k] * m->turn[k] / (double)n;
   }
-  const double n = m->known_count ? (double)m->known_count : 1;
-  m->mean_rotation /= n;
-  m->rms_rotation = sqrt(square / n);
+  m->rms_rotation = sqrt(square);
+  free(size);
 }
 
 // Strain of a triangle from the displacements of its corners, on the shape it had before (M28). False where that shape
@@ -130,13 +145,16 @@ void tal_motion_find(tal_motion *m, const tal_part *part, const tal_earlier *ear
                     .shear = tal_alloc(cells, sizeof(double)),
                     .dilation = tal_alloc(cells, sizeof(double)),
                     .cell = tal_alloc(cells, sizeof(bool)),
+                    .turn = tal_alloc(n, sizeof(double)),
                     .grain_shear = tal_alloc(n, sizeof(double))};
   match_grains(m, part, earlier);
+  cap_rotations(m, n);
   strain_cells(m, part);
 }
 
 void tal_motion_clear(tal_motion *m) {
-  void *const owned[] = {m->dx, m->dy, m->dtheta, m->known, m->matched, m->shear, m->dilation, m->cell, m->grain_shear};
+  void *const owned[] = {m->dx,      m->dy,    m->dtheta,   m->turn, m->known,
+                         m->matched, m->shear, m->dilation, m->cell, m->grain_shear};
   for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
     free(owned[k]);
   *m = (tal_motion){0};
@@ -266,8 +284,8 @@ tal_rotation_correlation tal_rotation_correlate(const tal_part *part, const tal_
   double *rotation = tal_alloc(s->grain_count, sizeof *rotation),
          *magnitude = tal_alloc(s->grain_count, sizeof *magnitude);
   for (size_t k = 0; k < s->grain_count; k++) {
-    rotation[k] = m->dtheta[k];
-    magnitude[k] = fabs(m->dtheta[k]);
+    rotation[k] = m->turn[k];
+    magnitude[k] = fabs(m->turn[k]);
   }
   const double v = centre(m, s->grain_count, rotation), w = centre(m, s->grain_count, magnitude);
   buckets b = fill_buckets(part, m, TAL_CORRELATION_BINS * c.width);

@@ -25,8 +25,11 @@ typedef struct tal_motion {
   bool *cell;               // owned; [cells of the snapshot] those have a meaning
   double *grain_shear;      // owned; [grains of the snapshot] area-weighted mean of shear over the cells around
   size_t known_count;
-  double mean_shear, mean_dilation;   // weighted by area
-  double mean_rotation, rms_rotation; // [rad]
+  double mean_shear, mean_dilation; // weighted by area
+  // Rotations with their sign. Those beyond the size that 98 % stay below count as that: a grain that carries nothing
+  // spins as it likes.
+  double *turn;                                        // owned; [grains of the snapshot] [rad]
+  double mean_rotation, median_rotation, rms_rotation; // [rad] of it; of its size
 } tal_motion;
 void tal_motion_find(tal_motion *motion, const tal_part *part, const tal_earlier *earlier);
 void tal_motion_clear(tal_motion *motion);

@@ -27,7 +27,8 @@ static void *create(tal_measuring *run) {
                  ",from_frame,from_strain,field,points,found,axis[deg],axis_error[deg],x[m],y[m],place_error[m],"
                  "width[m],width_error[m],width_diameters,base,height,height_error,explained,concentration");
   tal_tables_get(&run->tables, "motion.csv",
-                 TAL_ROW ",from_frame,from_strain,grains,mean_shear,mean_dilation,mean_rotation[deg],rms_rotation[deg],"
+                 TAL_ROW ",from_frame,from_strain,grains,mean_shear,mean_dilation,mean_rotation[deg],median_rotation["
+                         "deg],rms_rotation[deg],"
                          "rotation_length[m],rotation_length_error[m],rotation_length_diameters,rotation_amplitude,"
                          "velocity_fluctuation[m/s],displacement_fluctuation[m]");
   return at;
@@ -53,7 +54,7 @@ tal_field tal_rotation_field(const tal_part *part, const tal_motion *m) {
   tal_field f = tal_field_create(s->grain_count);
   for (size_t k = 0; k < s->grain_count; k++)
     if (m->known[k])
-      tal_field_add(&f, s->x[k], s->y[k], fabs(m->dtheta[k]), TAL_PI * s->r[k] * s->r[k]);
+      tal_field_add(&f, s->x[k], s->y[k], fabs(m->turn[k]), TAL_PI * s->r[k] * s->r[k]);
   return f;
 }
 
@@ -165,6 +166,7 @@ static void put_motion(tal_measuring *run, const state *at, const tal_part *part
   const double number[] = {m->mean_shear,
                            m->mean_dilation,
                            m->mean_rotation * degrees,
+                           m->median_rotation * degrees,
                            m->rms_rotation * degrees,
                            c->length,
                            c->length_error,
@@ -183,7 +185,7 @@ static void keep_for_persistence(state *at, const tal_part *part, const tal_moti
   const size_t n = part->of->grain_count;
   double *mean = tal_alloc(at->boxes.count + 1, sizeof *mean), *magnitude = tal_alloc(n, sizeof *magnitude);
   for (size_t k = 0; k < n; k++)
-    magnitude[k] = fabs(m->dtheta[k]);
+    magnitude[k] = fabs(m->turn[k]);
   const double *const value[2] = {m->grain_shear, magnitude};
   for (int which = 0; which < 2; which++) {
     at->windows[which].boxes = at->boxes.count;

@@ -11,7 +11,8 @@ typedef struct tal_tables {
   struct tal_one_table **table; // owned
 } tal_tables;
 
-// The open table of that file name; begins it with `header` (no line end) when it is new. Owned here. Threads may ask at once.
+// The open table of that file name; begins it with `header` (no line end) when it is new. Owned here. Threads may ask
+// at once.
 FILE *tal_tables_get(tal_tables *tables, const char *name, const char *header);
 // A comma and a number.
 void tal_put(FILE *table, double value);

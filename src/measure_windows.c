@@ -62,10 +62,11 @@ void tal_window_plan_make(tal_window_plan *plan, const tal_frame_choice *choice,
   for (size_t k = 0; k < n; k++) {
     if (!choice->detail[k] || plan->from[k] != SIZE_MAX)
       continue;
-    const size_t before = plan->step > 0 ? tal_frame_nearest(choice, strain_of(choice, k) - step) : SIZE_MAX;
-    plan->from[k] = before != SIZE_MAX && before < k && strain_of(choice, before) < strain_of(choice, k)
-                        ? before
-                        : last_before(choice, k);
+    // Not from a frame before the begin: in what came before, grains moved for other reasons.
+    const size_t near = plan->step > 0 ? tal_frame_nearest(choice, strain_of(choice, k) - step) : SIZE_MAX;
+    const size_t before = near < plan->first ? plan->first : near;
+    const bool strained = near != SIZE_MAX && before < k && strain_of(choice, before) < strain_of(choice, k);
+    plan->from[k] = strained ? before : last_before(choice, k);
   }
 }
 
