@@ -122,7 +122,8 @@ static void open_canvas(tal_plot *plot, const tal_measuring *run, const figure *
       plot->script,
       "set datafile separator ','\nset datafile missing NaN\nset border 3 lw 2 lc rgb '#606060'\nset tics nomirror out "
       "textcolor rgb '#000000'\n"
-      "set key outside bottom center Left reverse samplen 2 maxrows 3 font ',18'\nset xlabel '%s' offset 0,0.7\nset "
+      "set key outside bottom center Left reverse samplen 2 maxrows 3 font ',18'\nset bmargin 7.5\nset xlabel '%s' "
+      "offset 0,0.3\nset "
       "ylabel '%s' "
       "noenhanced\nset lmargin 11\nset rmargin 4\nset tmargin 5\n%s\nset label 1 '%s' at graph 0.5, graph 1.04 center "
       "font ',18' noenhanced\nset title ",

@@ -96,15 +96,15 @@ static void draw(tal_measuring *run, const tal_part *part, const tal_forces *f) 
     return;
   }
   tal_plot_canvas(&plot, 1250, 1000, 22);
-  fprintf(
-      plot.script,
-      "set border 3 lw 2 lc rgb '#606060'\nset tics nomirror out textcolor rgb '#000000'\nset key outside bottom "
-      "center Left reverse samplen 2 noenhanced font ',18'\nset logscale y\nset format y '10^{%%L}'\nset xlabel 'f / "
-      "⟨f⟩' offset 0,0.7\nset ylabel 'probability density'\nset xrange [0:8]\nset yrange [1e-4:10]\nset samples "
-      "1000\nset tmargin "
-      "5\nset label 1 'contact forces, axial strain %.3g %%, %.3g %% of the normal ones below the mean' at graph "
-      "0.5, graph 1.04 center font ',18'\nset title ",
-      100 * part->of->axial_strain, 100 * f->normal.below_mean);
+  fprintf(plot.script,
+          "set border 3 lw 2 lc rgb '#606060'\nset tics nomirror out textcolor rgb '#000000'\nset key outside bottom "
+          "center Left reverse samplen 2 maxrows 3 noenhanced font ',18'\nset bmargin 7.5\nset logscale y\nset format "
+          "y '10^{%%L}'\nset xlabel 'f / "
+          "⟨f⟩' offset 0,0.3\nset ylabel 'probability density'\nset xrange [0:8]\nset yrange [1e-4:10]\nset samples "
+          "1000\nset tmargin "
+          "5\nset label 1 'contact forces, axial strain %.3g %%, %.3g %% of the normal ones below the mean' at graph "
+          "0.5, graph 1.04 center font ',18'\nset title ",
+          100 * part->of->axial_strain, 100 * f->normal.below_mean);
   tal_plot_text(plot.script, run->name, 40);
   fputs(" noenhanced offset 0,1.2\n", plot.script);
   double *fn = tal_part_forces(part, part->of->contacts.fn), *ft = tal_part_forces(part, part->of->contacts.ft);
