@@ -211,8 +211,8 @@ static tal_band band_of(const tal_field *scaled, const tal_fit *fit, const doubl
   const summary fitted = summarise(scaled);
   band.explained = fmax(0, 1 - fit->residual / (fitted.variance * fitted.weight));
   band.concentration = concentration(scaled, fit);
-  band.found = p[HEIGHT] > 2 * error[HEIGHT] && band.width < 0.5 * (range[1] - range[0]) * diameter &&
-               p[PLACE] > range[0] && p[PLACE] < range[1];
+  band.found = p[HEIGHT] > 2 * error[HEIGHT] && band.width >= diameter &&
+               band.width < 0.5 * (range[1] - range[0]) * diameter && p[PLACE] > range[0] && p[PLACE] < range[1];
   return band;
 }
 

@@ -18,9 +18,9 @@ void tal_field_clear(tal_field *field);
 // One straight band: value = base + height exp(-(s - place)^2 / (2 sigma^2)), s across it (M33). Errors by leaving out
 // one of eight lengths of the band after the other (jackknife), which counts that neighbouring points are alike (M34).
 typedef struct tal_band {
-  bool found;                // height above two errors, width below half of the sample's extent across
-  double axis, axis_error;   // [rad] direction along the band, in [0, pi)
-  double x, y, place_error;  // [m] its point nearest to the middle of the points
+  bool found;               // height above two errors, width from a mean diameter to half of the sample's extent across
+  double axis, axis_error;  // [rad] direction along the band, in [0, pi)
+  double x, y, place_error; // [m] its point nearest to the middle of the points
   double width, width_error; // [m] full width at half height: 2.3548 sigma
   double base, height, height_error;
   double explained;     // share of the field's weighted variance

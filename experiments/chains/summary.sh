@@ -33,13 +33,13 @@ for dir; do
       put("22 coordination", $col["coordination"]); put("23 without rattlers", $col["coordination_bearing"])
       put("24 solid fraction", $col["solid_fraction"]); put("25 contacts around a void", $col["mean_sides"]) }
     file == "motion.csv" {
-      put("26 rotation length (mean diameters)", $col["rotation_length_diameters"])
+      if ($col["rotation_length"] > 0) put("26 rotation length (mean diameters)", $col["rotation_length_diameters"])
       put("27 median rotation (degrees)", $col["median_rotation"]) }
     file == "bands.csv" && $col["found"] == 1 {
       put($col["field"] == "shear" ? "28 width of the shear band (mean diameters)" : "30 width of the rotation band (mean diameters)",
           $col["width_diameters"])
       axis = $col["axis"]; if (axis > 90) axis = 180 - axis
-      put($col["field"] == "shear" ? "29 its axis off the horizontal (degrees)" : "31 its axis off the horizontal (degrees)", axis) }
+      put($col["field"] == "shear" ? "29 axis of the shear band off the horizontal (degrees)" : "31 axis of the rotation band off the horizontal (degrees)", axis) }
   ' "$m/tensors.csv" "$m/forces.csv" "$m/chains.csv" "$m/voids.csv" "$m/motion.csv" "$m/bands.csv"
   awk -F, -v run="$dir" 'NR > 1 && $2 == 1 { print run ",3,persistence of " $1 " (next window)," $6 }' "$m/persistence.csv"
   awk -F, -v run="$dir" 'NR > 1 && !$11 && !$12 && $6 > 0 { n++; life += $7 - $6; buckled += $10 > 0 }
