@@ -209,7 +209,8 @@ typedef struct correlating {
 } correlating;
 
 static void pair_up(const correlating *c, int32_t a, int32_t b) {
-  const double r = hypot(c->s->x[a] - c->s->x[b], c->s->y[a] - c->s->y[b]) / c->out->width;
+  const double dx = c->s->x[a] - c->s->x[b], dy = c->s->y[a] - c->s->y[b];
+  const double r = sqrt(dx * dx + dy * dy) / c->out->width; // hypot took half of the time
   if (r >= TAL_CORRELATION_BINS)
     return;
   const size_t k = (size_t)r;
