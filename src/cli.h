@@ -20,6 +20,7 @@ int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);
 int tal_cli_study(int argc, char **argv);
 int tal_cli_rotation(int argc, char **argv);
+int tal_cli_measure(int argc, char **argv);
 
 typedef struct tal_command {
   const char *name;
@@ -44,8 +45,9 @@ typedef enum tal_cli_accept {
   TAL_CLI_QUIET = 16,    // -q, --quiet
   TAL_CLI_FIGURES = 32,  // --no-figures
   TAL_CLI_STUDY = 64,    // --plan, --merge
-  TAL_CLI_FROM = 128,    // --from DIR
-  TAL_CLI_ROTATION = 256 // --grain ID, --frame, --network, --since N, --reach D
+  TAL_CLI_MEASURE = 128, // --at, --window, --region, --over, --angle, --export
+  TAL_CLI_FROM = 256,    // --from DIR
+  TAL_CLI_ROTATION = 512 // --grain ID, --frame, --network, --since N, --reach D
 } tal_cli_accept;
 
 typedef struct tal_cli_options {
@@ -55,8 +57,11 @@ typedef struct tal_cli_options {
   const char **sets;    // owned list of KEY=VALUE
   size_t set_count;
   bool resume, quiet;
-  bool figures;     // true unless --no-figures
-  bool plan, merge; // study: only write the plan, only merge
+  bool figures;                                    // true unless --no-figures
+  bool plan, merge;                                // study: only write the plan, only merge
+  const char *at, *window, *region, *over, *angle; // measure; NULL when not given
+  const char **exports;                            // owned list of fields
+  size_t export_count;
   const char *from; // run: folder or checkpoint to begin from, NULL when not given
   int64_t grain;    // rotation: -1 when not given
   int64_t frame;    // rotation: -1 when not given: the last

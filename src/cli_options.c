@@ -13,6 +13,8 @@ static const tal_command commands[] = {
     {"check", "SCENE.yaml [--set KEY=VALUE]...", "validate a scene and print what a run of it would do", tal_cli_check},
     {"impact", "SCENE.yaml [-o DIR] [--set KEY=VALUE]... [--no-figures]",
      "restitution and contact time of two mean grains over the damping: impact.csv, impact.png", tal_cli_impact},
+    {"measure", "DIR [-o OUT] [--at WHEN] [--window A:B] [--region WHERE] [--over STRAIN] [--export FIELD]...",
+     "force chains, fabric, force statistics, voids, bands of the stored fields: tables and figures", tal_cli_measure},
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
     {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
      "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},
@@ -60,10 +62,19 @@ static const option_help table[] = {
     {TAL_CLI_FIGURES, {"no-figures", no_argument, NULL, 'n'}, NULL, "draw no figures at the end"},
     {TAL_CLI_STUDY, {"plan", no_argument, NULL, 'p'}, NULL, "write the plan and run nothing"},
     {TAL_CLI_STUDY, {"merge", no_argument, NULL, 'm'}, NULL, "run nothing, merge the runs that are there"},
+    {TAL_CLI_MEASURE,
+     {"at", required_argument, NULL, 'a'},
+     "WHEN,...",
+     "axial strain, t=TIME, frame=N, first, last, peak, all"},
+    {TAL_CLI_MEASURE, {"window", required_argument, NULL, 'w'}, "A:B", "frames from axial strain A to B only"},
+    {TAL_CLI_MEASURE, {"region", required_argument, NULL, 'g'}, "WHERE", "X0:X1,Y0:Y1 or disc:X,Y,R [m]"},
+    {TAL_CLI_MEASURE, {"over", required_argument, NULL, 'v'}, "STRAIN", "displacements over this axial strain (0.02)"},
+    {TAL_CLI_MEASURE, {"angle", required_argument, NULL, 'l'}, "DEGREES", "of force chains (45)"},
+    {TAL_CLI_MEASURE, {"export", required_argument, NULL, 'x'}, "FIELD", "write contacts, or contacts/fn ..., as CSV"},
     {TAL_CLI_FROM, {"from", required_argument, NULL, 'f'}, "DIR", "begin with the state in which the run in DIR ended"},
-    {TAL_CLI_ROTATION, {"grain", required_argument, NULL, 'g'}, "ID", "the grain to look from, else the forced one"},
+    {TAL_CLI_ROTATION, {"grain", required_argument, NULL, 'G'}, "ID", "the grain to look from, else the forced one"},
     {TAL_CLI_ROTATION, {"frame", required_argument, NULL, 'k'}, "N", "the field frame, else the last"},
-    {TAL_CLI_ROTATION, {"network", required_argument, NULL, 'w'}, "N", "the frame whose forces count, else the same"},
+    {TAL_CLI_ROTATION, {"network", required_argument, NULL, 'W'}, "N", "the frame whose forces count, else the same"},
     {TAL_CLI_ROTATION,
      {"since", required_argument, NULL, 'i'},
      "N",
@@ -120,7 +131,27 @@ static int take_reach(tal_cli_options *options, const char *name, const char *te
   return refuse(name, "--reach", "is no distance; accepted: a number of mean diameters > 0");
 }
 
+static const char **place_of(tal_cli_options *options, int letter) {
+  switch (letter) {
+  case 'a':
+    return &options->at;
+  case 'w':
+    return &options->window;
+  case 'g':
+    return &options->region;
+  case 'v':
+    return &options->over;
+  case 'l':
+    return &options->angle;
+  default:
+    return NULL;
+  }
+}
+
 static int take(tal_cli_options *options, const char *name, int letter, const char *value) {
+  const char **place = place_of(options, letter);
+  if (place)
+    *place = value;
   switch (letter) {
   case 'o':
     if (!*value)
@@ -150,16 +181,19 @@ static int take(tal_cli_options *options, const char *name, int letter, const ch
   case 'f':
     options->from = value;
     return TAL_OK;
-  case 'g':
+  case 'G':
     return take_index(name, "--grain", value, &options->grain);
   case 'k':
     return take_index(name, "--frame", value, &options->frame);
-  case 'w':
+  case 'W':
     return take_index(name, "--network", value, &options->network);
   case 'i':
     return take_index(name, "--since", value, &options->since);
   case 'R':
     return take_reach(options, name, value);
+  case 'x':
+    options->exports[options->export_count++] = value;
+    return TAL_OK;
   default:
     return TAL_OK;
   }
@@ -219,6 +253,7 @@ bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned 
   *options = (tal_cli_options){.figures = true, .grain = -1, .frame = -1, .network = -1, .since = -1, .reach = 10};
   *exit_code = TAL_OK;
   options->sets = tal_alloc((size_t)argc + 1, sizeof *options->sets);
+  options->exports = tal_alloc((size_t)argc + 1, sizeof *options->exports);
   char **words = tal_alloc((size_t)argc + 2, sizeof *words); // getopt skips the first and reorders the rest
   words[0] = (char[]){"talus"};
   for (int i = 0; i < argc; i++)
@@ -239,6 +274,7 @@ bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned 
 
 void tal_cli_options_clear(tal_cli_options *options) {
   free(options->sets);
+  free(options->exports);
   *options = (tal_cli_options){0};
 }
 
