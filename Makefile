@@ -99,7 +99,7 @@ tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
-	@TALUS=$(abspath $(OUT)/talus) $(PYTHON) experiments/test_talus.py
+	@for t in experiments/test_*.py experiments/*/test_*.py; do TALUS=$(abspath $(OUT)/talus) $(PYTHON) $$t || exit 1; done
 	@for e in experiments/*/run.sh; do echo "$$e --short"; \
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)
