@@ -28,7 +28,7 @@ plt.rcParams.update({"font.size": 8, "axes.titlesize": 8, "figure.dpi": 130, "sa
 def maps(count, frame, columns=None):
     """A row of panels without axes, as high as the sample is."""
     columns = columns or count
-    x, y = frame.centres.T
+    x, y = inside(frame).T
     height = 2.6 * np.ptp(y) / np.ptp(x)
     lines = -(-count // columns)
     figure, axes = plt.subplots(lines, columns, figsize=(2.9 * columns, (height + 0.35) * lines), squeeze=False)
@@ -59,12 +59,18 @@ def outline(axis, frame, **style):
     closed(axis, frame.centres[frame["loop/node"]], **{"color": "#444444", "lw": 0.6, **style})
 
 
+def inside(frame):
+    """Centres of the grains that are not outside the loop."""
+    return frame.centres[np.unique(frame["cells/corner"])]
+
+
 def beads(axis, frame):
+    """Draws the membrane, if there is one; all that the picture has to show."""
     if "membrane/x" in frame and len(frame["membrane/x"]):
         at = np.stack([frame["membrane/x"], frame["membrane/y"]], axis=1)
         disks(axis, at, frame["membrane/r"], "#222222")
-        return at
-    return frame.centres
+        return np.concatenate([at, inside(frame)])
+    return inside(frame)
 
 
 def percent(frame):
@@ -154,20 +160,20 @@ class Figures:
             first, last = run.begin(measures.STAGE), run.frame()
             self.deformed(axis, run, first, last)
             shear = measures.rows(run)["shear_strain"][-1]
-            axis.set_title(f"order {kind[-1]}, shear {100 * abs(shear):.1f} %, "
+            axis.set_title(f"order {kind[-1]}, shear {100 * abs(shear):.1f} %\n"
                            f"shape index {measures.shape(run, last):.2f}")
         self.save(figure, "3.4-circle")
 
     def deformed(self, axis, run, first, last):
         """Grains coloured by stripes of the first state, and the affine image of the first loop (dashed)."""
-        loop, d = first["loop/node"], measures.diameter(run)
+        loop, d = measures.first_loop(first, last), measures.diameter(run)
         stripe = np.floor(first.centres / (8 * d)).astype(int).sum(axis=1) % 2
         colours = np.where(stripe[:, None], [[0.62, 0.74, 0.86]], [[0.95, 0.93, 0.88]])
         disks(axis, last.centres, last["grains/r"], colours)
-        image = last.centres[loop] - measures.talus.relative_to_affine(first, last)[loop]
+        image = last.centres[loop] - measures.talus.relative_to_affine(first, last, loop)[loop]
         closed(axis, image, color="#d55e00", lw=0.9, ls="--")
         outline(axis, last)
-        fit(axis, np.concatenate([last.centres, image]))
+        fit(axis, np.concatenate([inside(last), image]))
 
     # P Figs. 3.7-3.9: displacements relative to the affine ones
 
@@ -179,12 +185,12 @@ class Figures:
         figure, axes = maps(len(frames) - 1, frames[0])
         for axis, first, last in zip(axes, frames, frames[1:]):
             rest = measures.talus.relative_to_affine(first, last)
-            inside = np.unique(first["cells/corner"])
-            lines = MILLI * np.stack([first.centres[inside], first.centres[inside] + rest[inside]], axis=1)
+            kept = np.unique(first["cells/corner"])
+            lines = MILLI * np.stack([first.centres[kept], first.centres[kept] + rest[kept]], axis=1)
             axis.add_collection(LineCollection(lines, colors="#102a5c", linewidths=0.45))
             axis.plot(*lines[:, 1].T, ".", ms=0.7, color="#d55e00", mew=0)
             outline(axis, first, lw=0.4, color="#999999")
-            fit(axis, np.concatenate([beads(axis, first), first.centres]))
+            fit(axis, beads(axis, first))
             axis.set_title(f"{measures.KINDS[kind]}, {percent(first)} to {percent(last)}")
         self.save(figure, name)
 
@@ -202,7 +208,7 @@ class Figures:
             above = value > multiple * np.sum(value * area) / area.sum()
             axis.add_collection(PolyCollection(MILLI * frame.centres[frame["cells/corner"][above]], facecolors=colour, lw=0))
             outline(axis, frame)
-            fit(axis, np.concatenate([beads(axis, frame), frame.centres]))
+            fit(axis, beads(axis, frame))
             axis.set_title(f"{measures.KINDS[kind]}, {percent(frame)}")
         self.save(figure, name)
 
@@ -238,7 +244,7 @@ class Figures:
         for axis, (kind, run) in zip(axes, runs.items()):
             last = run.frame()
             self.deformed(axis, run, run.begin(measures.STAGE), last)
-            axis.set_title(f"N = {len(last['grains/id'])}, order {kind[-1]}, {percent(last)}, "
+            axis.set_title(f"N = {len(last['grains/id'])}, order {kind[-1]}, {percent(last)}\n"
                            f"shape index {measures.shape(run, last):.2f}")
         self.save(figure, "3.13-size")
 

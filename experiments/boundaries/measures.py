@@ -207,11 +207,18 @@ def circles(run, strain, diameters):
 # Shape, errors, cost
 
 
+def first_loop(first, last):
+    """Grains of the first frame's loop that are not outside the last frame's."""
+    loop = first["loop/node"]
+    return loop[np.isin(loop, last["cells/corner"])]
+
+
 def shape(run, last):
     """Root mean square distance of the loop's first grains from the affine image of their first positions, in mean
     diameters."""
     first = run.begin(STAGE)
-    rest = talus.relative_to_affine(first, last)[first["loop/node"]]
+    loop = first_loop(first, last)
+    rest = talus.relative_to_affine(first, last, loop)[loop]
     return np.sqrt((rest**2).sum(axis=1).mean()) / diameter(run)
 
 

@@ -64,7 +64,7 @@ def shape(run, strain):
 def turn(run, strain):
     """Size of the rotation in the mean deformation gradient of the first loop."""
     first, last = run.begin(measures.STAGE), *measures.frames(run, (strain,))
-    loop = first["loop/node"]
+    loop = measures.first_loop(first, last)
     h = measures.talus.loop_gradient(first.centres[loop], measures.talus.displacement(first, last)[loop])
     return np.degrees(abs(np.arctan2(h[1, 0] - h[0, 1], 2 + h[0, 0] + h[1, 1])))
 
