@@ -160,7 +160,10 @@ def margins(frame):
     share = np.linspace(0, 1, 20, endpoint=False)[:, None, None]
     rim = (loop * (1 - share) + np.roll(loop, -1, axis=0) * share).reshape(-1, 2)
     bins = 60
-    place = lambda y: np.clip(((y - bottom) / (top - bottom) * bins).astype(int), 0, bins - 1)
+
+    def place(y):
+        return np.clip(((y - bottom) / (top - bottom) * bins).astype(int), 0, bins - 1)
+
     left, right = np.full(bins, np.inf), np.full(bins, -np.inf)
     np.minimum.at(left, place(rim[:, 1]), rim[:, 0])
     np.maximum.at(right, place(rim[:, 1]), rim[:, 0])
