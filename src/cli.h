@@ -19,6 +19,7 @@ int tal_cli_plot(int argc, char **argv);
 int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);
 int tal_cli_study(int argc, char **argv);
+int tal_cli_rotation(int argc, char **argv);
 int tal_cli_measure(int argc, char **argv);
 
 typedef struct tal_command {
@@ -37,14 +38,16 @@ void tal_cli_usage(FILE *out);
 
 // Options a command may accept, or'ed together.
 typedef enum tal_cli_accept {
-  TAL_CLI_OUT = 1,      // -o, --out DIR
-  TAL_CLI_THREADS = 2,  // -t, --threads N
-  TAL_CLI_SET = 4,      // --set KEY=VALUE, repeated
-  TAL_CLI_RESUME = 8,   // --resume
-  TAL_CLI_QUIET = 16,   // -q, --quiet
-  TAL_CLI_FIGURES = 32, // --no-figures
-  TAL_CLI_STUDY = 64,   // --plan, --merge
-  TAL_CLI_MEASURE = 128 // --at, --window, --region, --over, --angle, --export
+  TAL_CLI_OUT = 1,       // -o, --out DIR
+  TAL_CLI_THREADS = 2,   // -t, --threads N
+  TAL_CLI_SET = 4,       // --set KEY=VALUE, repeated
+  TAL_CLI_RESUME = 8,    // --resume
+  TAL_CLI_QUIET = 16,    // -q, --quiet
+  TAL_CLI_FIGURES = 32,  // --no-figures
+  TAL_CLI_STUDY = 64,    // --plan, --merge
+  TAL_CLI_MEASURE = 128, // --at, --window, --region, --over, --angle, --export
+  TAL_CLI_FROM = 256,    // --from DIR
+  TAL_CLI_ROTATION = 512 // --grain ID, --frame, --network, --since N, --reach D
 } tal_cli_accept;
 
 typedef struct tal_cli_options {
@@ -59,6 +62,12 @@ typedef struct tal_cli_options {
   const char *at, *window, *region, *over, *angle; // measure; NULL when not given
   const char **exports;                            // owned list of fields
   size_t export_count;
+  const char *from; // run: folder or checkpoint to begin from, NULL when not given
+  int64_t grain;    // rotation: -1 when not given
+  int64_t frame;    // rotation: -1 when not given: the last
+  int64_t network;  // rotation: -1 when not given: the same frame
+  int64_t since;    // rotation: -1 when not given: spins of the instant
+  double reach;     // rotation: [mean diameters], 10 when not given
 } tal_cli_options;
 
 // Parses the words after the command `name`, which accepts the options of `accepted` and needs exactly one argument,

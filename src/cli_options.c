@@ -8,7 +8,7 @@
 #include <string.h>
 
 static const tal_command commands[] = {
-    {"run", "SCENE.yaml [-o DIR] [-t THREADS] [--set KEY=VALUE]... [--resume] [-q] [--no-figures]",
+    {"run", "SCENE.yaml [-o DIR] [-t THREADS] [--set KEY=VALUE]... [--resume] [--from DIR] [-q] [--no-figures]",
      "run a scene; series, fields, checkpoints and figures go to DIR", tal_cli_run},
     {"check", "SCENE.yaml [--set KEY=VALUE]...", "validate a scene and print what a run of it would do", tal_cli_check},
     {"impact", "SCENE.yaml [-o DIR] [--set KEY=VALUE]... [--no-figures]",
@@ -18,6 +18,9 @@ static const tal_command commands[] = {
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
     {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
      "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},
+    {"rotation", "DIR [--grain ID] [--frame N] [--network N] [--since N] [--reach DIAMETERS] [--no-figures]",
+     "how far the spin of forced grains reaches in the runs in and below DIR, and what force chains do to it",
+     tal_cli_rotation},
     {"verify", "DIR", "check the files of a run against their checksums and each other", tal_cli_verify},
     {"keys", "[KEY] [--json | --markdown | --bash]", "every scene key: type, unit, range, default, meaning",
      tal_cli_keys},
@@ -68,6 +71,15 @@ static const option_help table[] = {
     {TAL_CLI_MEASURE, {"over", required_argument, NULL, 'v'}, "STRAIN", "displacements over this axial strain (0.02)"},
     {TAL_CLI_MEASURE, {"angle", required_argument, NULL, 'l'}, "DEGREES", "of force chains (45)"},
     {TAL_CLI_MEASURE, {"export", required_argument, NULL, 'x'}, "FIELD", "write contacts, or contacts/fn ..., as CSV"},
+    {TAL_CLI_FROM, {"from", required_argument, NULL, 'f'}, "DIR", "begin with the state in which the run in DIR ended"},
+    {TAL_CLI_ROTATION, {"grain", required_argument, NULL, 'G'}, "ID", "the grain to look from, else the forced one"},
+    {TAL_CLI_ROTATION, {"frame", required_argument, NULL, 'k'}, "N", "the field frame, else the last"},
+    {TAL_CLI_ROTATION, {"network", required_argument, NULL, 'W'}, "N", "the frame whose forces count, else the same"},
+    {TAL_CLI_ROTATION,
+     {"since", required_argument, NULL, 'i'},
+     "N",
+     "mean spins since that frame, not those of the instant"},
+    {TAL_CLI_ROTATION, {"reach", required_argument, NULL, 'R'}, "D", "cutoff in mean diameters, 10 by default"},
     {0, {"help", no_argument, NULL, 'h'}, NULL, "this text"}};
 
 #define OPTIONS (sizeof table / sizeof *table)
@@ -105,6 +117,18 @@ static int take_threads(tal_cli_options *options, const char *name, const char *
   }
   options->threads = (int)value;
   return TAL_OK;
+}
+
+static int take_index(const char *name, const char *option, const char *text, int64_t *out) {
+  if (tal_read_whole(text, out) == TAL_NUMBER_OK && *out >= 0)
+    return TAL_OK;
+  return refuse(name, option, "is no number; accepted: a whole number from 0");
+}
+
+static int take_reach(tal_cli_options *options, const char *name, const char *text) {
+  if (tal_read_real(text, &options->reach) == TAL_NUMBER_OK && options->reach > 0)
+    return TAL_OK;
+  return refuse(name, "--reach", "is no distance; accepted: a number of mean diameters > 0");
 }
 
 static const char **place_of(tal_cli_options *options, int letter) {
@@ -154,6 +178,19 @@ static int take(tal_cli_options *options, const char *name, int letter, const ch
   case 'm':
     options->merge = true;
     return TAL_OK;
+  case 'f':
+    options->from = value;
+    return TAL_OK;
+  case 'G':
+    return take_index(name, "--grain", value, &options->grain);
+  case 'k':
+    return take_index(name, "--frame", value, &options->frame);
+  case 'W':
+    return take_index(name, "--network", value, &options->network);
+  case 'i':
+    return take_index(name, "--since", value, &options->since);
+  case 'R':
+    return take_reach(options, name, value);
   case 'x':
     options->exports[options->export_count++] = value;
     return TAL_OK;
@@ -213,7 +250,7 @@ static bool take_all(tal_cli_options *options, const char *name, unsigned accept
 
 bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned accepted, const char *argument,
                            int argc, char **argv, int *exit_code) {
-  *options = (tal_cli_options){.figures = true};
+  *options = (tal_cli_options){.figures = true, .grain = -1, .frame = -1, .network = -1, .since = -1, .reach = 10};
   *exit_code = TAL_OK;
   options->sets = tal_alloc((size_t)argc + 1, sizeof *options->sets);
   options->exports = tal_alloc((size_t)argc + 1, sizeof *options->exports);

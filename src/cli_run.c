@@ -1,7 +1,9 @@
-// talus run SCENE.yaml [-o DIR] [-t THREADS] [--set K=V]... [--resume] [-q] [--no-figures]
+// talus run SCENE.yaml [-o DIR] [-t THREADS] [--set K=V]... [--resume] [--from DIR] [-q] [--no-figures]
 #include "cli.h"
 
+#include "ensemble.h"
 #include "figures.h"
+#include "files.h"
 #include "run.h"
 
 #include <math.h>
@@ -66,11 +68,49 @@ static int finish(tal_status status, const tal_run_result *result, const tal_cli
   }
 }
 
+// The runs of many forced grains, once the state they begin from is there.
+static int make_ensemble(const tal_scene *scene, const tal_cli_options *options, const char *dir) {
+  char program[TAL_PATH_SIZE];
+  tal_error err = {""};
+  tal_ensemble_result result;
+  tal_status status = tal_program_path(program, sizeof program, &err);
+  const tal_ensemble_options how = {dir, program, options->sets, options->set_count, options->threads, options->quiet};
+  if (status == TAL_OK)
+    status = tal_ensemble_run(scene, &how, &result, &err);
+  if (status == TAL_INTERRUPTED)
+    fprintf(stderr, "talus: interrupted; go on with: talus run %s -o %s --resume\n", options->argument, dir);
+  else if (status == TAL_BAD_INPUT)
+    fprintf(stderr, "%s\n", err.text);
+  else if (status)
+    tal_cli_print_error(status, &err);
+  if (status)
+    return status;
+  printf("%s/runs: %zu of %zu forced grains done\n", dir, result.grains - result.failed - result.unfinished,
+         result.grains);
+  if (result.failed)
+    fprintf(stderr, "talus: %zu forced grains failed, the first is %s\n", result.failed, result.reason);
+  return result.failed ? TAL_INVALID : TAL_OK;
+}
+
+static int run_all(const tal_scene *scene, const tal_cli_options *options, const char *dir) {
+  const bool many = tal_ensemble_asked(scene);
+  const tal_scene confined = many ? tal_ensemble_confined(scene) : *scene;
+  const tal_run_options plan = {dir, options->threads, options->resume, options->quiet, options->from};
+  tal_run_result result = {0};
+  tal_error err = {""};
+  tal_status status = many ? tal_ensemble_check(scene, &err) : TAL_OK;
+  if (status == TAL_OK)
+    status = tal_run_scene(&confined, &plan, &result, &err);
+  int exit_code =
+      many && status == TAL_OK && result.already_done ? TAL_OK : finish(status, &result, options, dir, &err);
+  return many && exit_code == TAL_OK ? make_ensemble(scene, options, dir) : exit_code;
+}
+
 int tal_cli_run(int argc, char **argv) {
   tal_cli_options options;
   int exit_code;
   const unsigned accepted =
-      TAL_CLI_OUT | TAL_CLI_THREADS | TAL_CLI_SET | TAL_CLI_RESUME | TAL_CLI_QUIET | TAL_CLI_FIGURES;
+      TAL_CLI_OUT | TAL_CLI_THREADS | TAL_CLI_SET | TAL_CLI_RESUME | TAL_CLI_QUIET | TAL_CLI_FIGURES | TAL_CLI_FROM;
   if (!tal_cli_options_parse(&options, "run", accepted, "SCENE.yaml", argc, argv, &exit_code))
     return exit_code;
   tal_scene scene;
@@ -80,10 +120,7 @@ int tal_cli_run(int argc, char **argv) {
     return tal_cli_print_errors(&errors);
   }
   const char *dir = options.out ? options.out : scene.name;
-  tal_run_options plan = {dir, options.threads, options.resume, options.quiet};
-  tal_run_result result;
-  tal_error err = {""};
-  exit_code = finish(tal_run_scene(&scene, &plan, &result, &err), &result, &options, dir, &err);
+  exit_code = run_all(&scene, &options, dir);
   tal_scene_clear(&scene);
   tal_cli_options_clear(&options);
   return exit_code;

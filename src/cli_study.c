@@ -57,10 +57,9 @@ static tal_status merge(const tal_study *study, const char *dir, const tal_cli_o
 
 static tal_status run(const tal_study *study, const char *dir, const tal_cli_options *options, tal_error *err) {
   char program[TAL_PATH_SIZE];
-  const ssize_t length = readlink("/proc/self/exe", program, sizeof program - 1);
-  if (length <= 0)
-    return tal_fail(err, TAL_IO, "/proc/self/exe: the program cannot be found");
-  program[length] = '\0';
+  tal_status status = tal_program_path(program, sizeof program, err);
+  if (status)
+    return status;
   const tal_study_options plan = {dir, program, options->threads, options->quiet};
   return tal_study_run_all(study, &plan, err);
 }

@@ -174,7 +174,11 @@ static void facts_of_text(tal_run_facts *facts, const char *text, size_t size, i
   if (yaml_parser_load(&parser, &document)) {
     const yaml_node_t *root = yaml_document_get_root_node(&document);
     const yaml_node_t *scene = depth == 0 ? member(&document, root, "scene") : root;
-    const char *inner = scalar(scene);
+    const char *inner = scalar(scene), *forced = depth == 0 ? scalar(member(&document, root, "forced_grain")) : NULL;
+    const char *status = depth == 0 ? scalar(member(&document, root, "status")) : NULL;
+    facts->done = facts->done || (status && strcmp(status, "done") == 0);
+    if (forced)
+      facts->forced_grain = strtoll(forced, NULL, 10);
     if (inner && depth == 0)
       facts_of_text(facts, inner, strlen(inner), 1);
     else
@@ -198,7 +202,7 @@ static char *last_part(const char *path) {
 }
 
 void tal_run_facts_read(tal_run_facts *facts, const char *dir) {
-  *facts = (tal_run_facts){.name = last_part(dir), .confine_stage = -1, .pressure = (double)NAN};
+  *facts = (tal_run_facts){.name = last_part(dir), .confine_stage = -1, .pressure = (double)NAN, .forced_grain = -1};
   char *path = tal_path_join(dir, "run.json");
   size_t size;
   char *text = read_file(path, &size);

@@ -4,6 +4,7 @@
 #define TAL_FIGURES_DATA_H
 
 #include "base.h"
+#include <stdbool.h>
 
 // A table of numbers with named columns.
 typedef struct tal_table {
@@ -25,6 +26,8 @@ typedef struct tal_run_facts {
   char *name;            // owned; scene name, else the last part of the folder's path
   int64_t confine_stage; // index of the first confine stage, -1: none known
   double pressure;       // [Pa] its target, NAN: not known
+  bool done;             // the run is complete
+  int64_t forced_grain;  // id of the grain whose spin the last stage imposes, -1: none
 } tal_run_facts;
 
 // Never fails: a figure without its scene name is better than none.

@@ -83,6 +83,16 @@ static double *read_reals(reading *in, const char *group, const char *path, size
   return read_array(in, group, path, count, H5T_NATIVE_DOUBLE);
 }
 
+// The same, NAN all over where there is no such data set.
+static double *read_optional(reading *in, const char *group, const char *path, size_t count) {
+  if (extent(in->file, path, group))
+    return read_reals(in, group, path, count);
+  double *value = tal_alloc(count, sizeof *value);
+  for (size_t k = 0; k < count; k++)
+    value[k] = (double)NAN;
+  return value;
+}
+
 // Whole numbers in [0, limit).
 static int64_t *read_indices(reading *in, const char *group, const char *path, size_t count, size_t limit) {
   int64_t *value = read_array(in, group, path, count, H5T_NATIVE_INT64);
@@ -99,6 +109,7 @@ static void read_grains(reading *in, tal_frame *frame) {
   frame->y = read_reals(in, "/grains", "/grains/y", n);
   frame->r = read_reals(in, "/grains", "/grains/r", n);
   frame->theta = read_reals(in, "/grains", "/grains/theta", n);
+  frame->omega = read_optional(in, "/grains", "/grains/omega", n);
 }
 
 // Contacts whose overlap is round-off of the coordinates (a packing that rests on nothing but geometry) carry forces
@@ -111,6 +122,7 @@ static void drop_hairs(tal_frame *frame, const double *overlap) {
       continue;
     frame->i[kept] = frame->i[c];
     frame->j[kept] = frame->j[c];
+    frame->ft[kept] = frame->ft[c];
     frame->fn[kept++] = frame->fn[c];
   }
   frame->contact_count = kept;
@@ -121,6 +133,7 @@ static void read_contacts(reading *in, tal_frame *frame) {
   frame->i = read_indices(in, "/contacts", "/contacts/i", n, frame->grain_count);
   frame->j = read_indices(in, "/contacts", "/contacts/j", n, frame->grain_count);
   frame->fn = read_reals(in, "/contacts", "/contacts/fn", n);
+  frame->ft = read_optional(in, "/contacts", "/contacts/ft", n);
   double *overlap = read_reals(in, "/contacts", "/contacts/overlap", n);
   if (!in->failed)
     drop_hairs(frame, overlap);
@@ -203,10 +216,10 @@ tal_status tal_frame_read(tal_frame *frame, const char *path, tal_error *err) {
 }
 
 void tal_frame_clear(tal_frame *frame) {
-  void *const owned[] = {frame->id,        frame->x,         frame->y,    frame->r,        frame->theta,
-                         frame->i,         frame->j,         frame->fn,   frame->wall,     frame->corner[0],
-                         frame->corner[1], frame->corner[2], frame->L_II, frame->pressure, frame->area,
-                         frame->loop,      frame->bx,        frame->by,   frame->br};
+  void *const owned[] = {
+      frame->id,   frame->x,    frame->y,         frame->r,         frame->theta,     frame->i,     frame->j,
+      frame->fn,   frame->wall, frame->corner[0], frame->corner[1], frame->corner[2], frame->L_II,  frame->pressure,
+      frame->area, frame->loop, frame->bx,        frame->by,        frame->br,        frame->omega, frame->ft};
   for (size_t k = 0; k < sizeof owned / sizeof *owned; k++)
     free(owned[k]);
   *frame = (tal_frame){0};

@@ -22,9 +22,11 @@ typedef struct tal_frame {
   size_t grain_count;
   int64_t *id;               // owned; [grain_count] ascending
   double *x, *y, *r, *theta; // owned; [grain_count] [m], [rad]
+  double *omega;             // owned; [grain_count] [rad/s]; NAN where the file has none
   size_t contact_count;      // grain-grain, overlap beyond round-off
   int64_t *i, *j;            // owned; [contact_count] grain indices
   double *fn;                // owned; [contact_count] normal force [N]
+  double *ft;                // owned; [contact_count] tangential force [N]; NAN where the file has none
   size_t wall_count;         // walls and plates there at this time
   double (*wall)[4];         // owned; [wall_count] x0 y0 x1 y1 [m]; a plate as wide as the grains lie
   size_t bead_count;         // of a membrane

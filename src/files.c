@@ -26,6 +26,14 @@ static bool is_folder(const char *path) {
   return stat(path, &info) == 0 && S_ISDIR(info.st_mode);
 }
 
+tal_status tal_program_path(char *path, size_t size, tal_error *err) {
+  const ssize_t length = readlink("/proc/self/exe", path, size - 1);
+  if (length <= 0)
+    return tal_fail(err, TAL_IO, "/proc/self/exe: the program cannot be found");
+  path[length] = '\0';
+  return TAL_OK;
+}
+
 tal_status tal_folder_create(const char *path, tal_error *err) {
   char part[TAL_PATH_SIZE];
   snprintf(part, sizeof part, "%s", path);

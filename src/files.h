@@ -14,6 +14,8 @@
 // Joins folder and name into path. A path too long for the system is cut, and opening it then fails.
 void tal_file_path(char path[TAL_PATH_SIZE], const char *folder, const char *name);
 bool tal_file_exists(const char *path);
+// Path of the program that is running. TAL_IO.
+tal_status tal_program_path(char *path, size_t size, tal_error *err);
 // Makes a folder with its parents; fine when it is there already. TAL_IO with the reason.
 tal_status tal_folder_create(const char *path, tal_error *err);
 

@@ -90,6 +90,8 @@ static void put_run(tal_json *json, const tal_sim *sim, const tal_run_report *re
   tal_json_integer(json, "grains", (int64_t)sim->grains.count);
   tal_json_number(json, "thickness", sim->constants.thickness);
   tal_json_number(json, "vR", sim->constants.vR);
+  if (sim->run.forced)
+    tal_json_integer(json, "forced_grain", sim->grains.id[sim->run.forced - 1]);
   if (sim->run.penalty > 0)
     tal_json_number(json, "penalty", sim->run.penalty);
   tal_json_integer(json, "steps", sim->run.step);

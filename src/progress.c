@@ -21,6 +21,8 @@ double tal_progress_nominal_time(const tal_scene_stage *stage, bool *open) {
     return stage->duration;
   if (isfinite(stage->rate) && stage->rate != 0 && isfinite(stage->strain))
     return fabs(stage->strain / stage->rate);
+  if (isfinite(stage->hold))
+    return stage->ramp + stage->hold;
   *open = true;
   return isfinite(stage->ramp) ? stage->ramp : 0;
 }

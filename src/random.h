@@ -6,7 +6,12 @@
 #include <gsl/gsl_rng.h>
 #include <stdint.h>
 
-typedef enum tal_stream { TAL_STREAM_RADIUS = 1, TAL_STREAM_DROP = 2 } tal_stream;
+typedef enum tal_stream {
+  TAL_STREAM_RADIUS = 1,
+  TAL_STREAM_DROP = 2,
+  TAL_STREAM_FORCED = 3,
+  TAL_STREAM_BOOTSTRAP = 4
+} tal_stream;
 
 // The stream of a scene's seed: all 64 bits of the seed count. Free with gsl_rng_free().
 gsl_rng *tal_random_stream(uint64_t seed, tal_stream stream);

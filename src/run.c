@@ -1,7 +1,10 @@
 #include "run.h"
 
+#include "checkpoint.h"
 #include "critical.h"
 #include "effects.h"
+#include "files.h"
+#include "forced.h"
 #include "forces.h"
 #include "integrate.h"
 #include "output.h"
@@ -63,7 +66,7 @@ typedef struct job {
   bool checkpoint; // one has been written, or the run was resumed from one
 } job;
 
-enum { WARNINGS = 3, WARNING_SIZE = 200 };
+enum { WARNINGS = 4, WARNING_SIZE = 200 };
 
 // What the user should know about the accuracy of this run; count of sentences in `text`.
 static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
@@ -83,14 +86,15 @@ static size_t warnings(const job *this, char text[WARNINGS][WARNING_SIZE]) {
         text[count++], WARNING_SIZE,
         "up to %lld grains at a time lay outside the boundary: nothing pressed on them until it reached them again",
         (long long)this->sim->run.outside_most);
-  return count;
+  tal_forced_warning(this->sim, text[count], WARNING_SIZE);
+  return count + (*text[count] != '\0');
 }
 
 static tal_status report_run(job *this, const char *name, const char *reason, tal_error *err) {
   double took = clock_now() - this->started;
   int64_t steps = this->sim->run.step - this->first_step;
   char text[WARNINGS][WARNING_SIZE];
-  const char *const sentences[WARNINGS] = {text[0], text[1], text[2]};
+  const char *const sentences[WARNINGS] = {text[0], text[1], text[2], text[3]};
   tal_run_report report = {.status = name,
                            .reason = reason,
                            .cores = this->cores,
@@ -287,6 +291,34 @@ int tal_run_threads(size_t grains, int asked) {
   return threads;
 }
 
+tal_status tal_run_from(tal_sim *sim, const char *path, tal_error *err) {
+  char inside[TAL_PATH_SIZE];
+  tal_checkpoint_head head;
+  tal_run_files files;
+  tal_file_path(inside, path, "checkpoint.h5");
+  const char *file = tal_file_exists(inside) ? inside : path;
+  tal_status status = tal_checkpoint_peek(file, &head, err);
+  if (status)
+    return status;
+  tal_run_files_clear(&head.files);
+  tal_scene before = *sim->scene;
+  before.stage_count = head.run.stage_begun ? (size_t)head.run.stage + 1 : 0;
+  if (!head.complete)
+    return tal_fail(err, TAL_BAD_INPUT, "%s: that run is not finished; accepted: a finished run", file);
+  if (before.stage_count >= sim->scene->stage_count)
+    return tal_fail(err, TAL_BAD_INPUT,
+                    "%s: the scene has no stage beyond the %zu of that run; accepted: a further stage", file,
+                    before.stage_count);
+  char *text = tal_scene_text(&before);
+  status = tal_checkpoint_read(file, sim, text, &files, err);
+  free(text);
+  if (status)
+    return status;
+  tal_run_files_clear(&files);
+  tal_sim_restored(sim);
+  return TAL_OK;
+}
+
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err) {
   *result = (tal_run_result){0};
@@ -294,6 +326,8 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
   tal_status status = tal_sim_create(&run.sim, scene, err);
   if (status == TAL_OK)
     status = tal_output_check_tracks(scene, run.sim->grains.count, err);
+  if (status == TAL_OK && options->from && !options->resume)
+    status = tal_run_from(run.sim, options->from, err);
   if (status == TAL_OK)
     run.cores = tal_run_threads(run.sim->grains.count, options->threads);
   if (status == TAL_OK)

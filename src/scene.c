@@ -102,6 +102,8 @@ tal_status tal_scene_load(tal_scene *scene, const char *path, const char *const 
 }
 
 void tal_scene_clear(tal_scene *scene) {
+  for (size_t s = 0; s < scene->stage_count; s++)
+    free(scene->stages[s].grain.ids);
   tal_schema_release(tal_schema(), scene);
   free(scene->path);
   *scene = (tal_scene){0};

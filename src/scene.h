@@ -116,6 +116,15 @@ typedef struct tal_scene_membrane {
   double damping;   // [-] of a link, share of critical
 } tal_scene_membrane;
 
+// Grains whose spin a stage imposes. None listed and random 0: the one nearest to the middle.
+typedef struct tal_scene_forced {
+  int64_t *ids; // owned; [count]
+  size_t count;
+  int64_t random; // grains drawn for an ensemble
+  double margin;  // [mean diameters] between them and the loop
+  bool many;      // a list was given
+} tal_scene_forced;
+
 typedef struct tal_scene_stage {
   const char *kind;                // name of a registered stage: free, confine, compress, shear, deform
   const char *boundary;            // name of a registered boundary (shear, deform: minimal; resolved by the loader)
@@ -124,7 +133,7 @@ typedef struct tal_scene_stage {
   int64_t order;                   // minimal, exact: p; else -1
   double duration;                 // [s] free, deform
   double pressure;                 // [Pa] all but free (NAN: inherited from confine; resolved by the loader)
-  double ramp;                     // [s] confine
+  double ramp;                     // [s] confine, spin
   double friction;                 // [-] confine; NAN: the material's
   double plate_friction;           // [-] confine, compress: of the plates; NAN: that of the grains in this stage
   double tolerance;                // [-] confine: on the stresses, default 0.01
@@ -135,6 +144,9 @@ typedef struct tal_scene_stage {
   tal_scene_membrane membrane;     // compress with boundary: membrane
   tal_scene_rates rates;           // deform
   tal_scene_stresses stresses;     // deform
+  tal_scene_forced grain;          // spin
+  double omega;                    // [rad/s] spin
+  double hold;                     // [s] spin: after the ramp
   tal_scene_integrator integrator; // the stage's own, else a copy of the scene's
   int line;                        // of the stage in the file, for messages
 } tal_scene_stage;

@@ -350,6 +350,26 @@ static void check_components(const stage_place *at) {
       wrong_stage(at, pairs[k][1], "stands beside %s; accepted: one of the two", pairs[k][0]);
 }
 
+// Grains that are there and free to turn; a plan of many is the last stage.
+static void check_spin(const stage_place *at, const tal_scene_stage *stage) {
+  const tal_scene *scene = at->c->scene;
+  const int64_t total = isnan(scene->pack.cut_radius) ? grain_total(scene) : 0;
+  if (!scene->rotation)
+    wrong_stage(at, "kind", "spin has no effect with rotation: false; accepted: rotation: true");
+  if (stage->omega == 0)
+    wrong_stage(at, "omega", "is zero; accepted: a number in rad/s that is not 0");
+  for (size_t k = 0; k < stage->grain.count; k++) {
+    const int64_t id = stage->grain.ids[k];
+    if (total && id >= total)
+      wrong_stage(at, "grain", "%lld is no grain; accepted: ids from 0 to %lld", (long long)id, (long long)total - 1);
+    else if (total && scene->grains.list_count && scene->grains.list[id].fixed)
+      wrong_stage(at, "grain", "%lld is a fixed grain: it keeps its spin; accepted: grains that are free",
+                  (long long)id);
+  }
+  if ((stage->grain.many || stage->grain.random) && at->index + 1 < scene->stage_count)
+    wrong_stage(at, "grain", "forces many grains, each in a run of its own; accepted: in the last stage only");
+}
+
 static void check_boundaries(const checker *c) {
   const tal_node *list = tal_node_get(c->root, "stages");
   const tal_node *node = list ? list->child : NULL;
@@ -361,6 +381,8 @@ static void check_boundaries(const checker *c) {
     check_method(&at, stage);
     if (named(stage->kind, "deform"))
       check_components(&at);
+    if (named(stage->kind, "spin"))
+      check_spin(&at, stage);
     if (named(stage->kind, "shear") && stage->rate == 0)
       wrong_stage(&at, "rate", "is zero; accepted: a number in 1/s that is not 0");
   }

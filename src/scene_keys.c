@@ -62,8 +62,8 @@ static bool asked(const visit *v, const char *path, const tal_key *key) {
 }
 
 static const char *type_name(const tal_key *key) {
-  static const char *const names[] = {"number", "whole",  "bool",     "text",    "choice",
-                                      "[x, y]", "wholes", "[[a, b]]", "mapping", "list"};
+  static const char *const names[] = {"number", "whole",    "bool",    "text", "choice", "[x, y]",
+                                      "wholes", "[[a, b]]", "mapping", "list", "grains", "any"};
   return names[key->type];
 }
 

@@ -113,6 +113,13 @@ static void put_type(FILE *out, const tal_key *key) {
     put_group(out, key->keys);
     fputc('}', out);
     break;
+  case TAL_KEY_FORCED:
+    fputs("\"anyOf\": [{\"enum\": [\"nearest\"]}, {\"type\": \"integer\", \"minimum\": 0}, {", out);
+    put_array(out, "{\"type\": \"integer\", \"minimum\": 0}", 1, 0);
+    fputs("}, {\"type\": \"object\", \"required\": [\"random\"], \"additionalProperties\": false, \"properties\": "
+          "{\"random\": {\"type\": \"integer\", \"minimum\": 1}, \"margin\": {\"type\": \"number\", \"minimum\": 0}}}]",
+          out);
+    break;
   case TAL_KEY_TREE:
     fputs("\"type\": [\"object\", \"array\", \"string\", \"number\", \"boolean\"]", out);
     break;

@@ -148,7 +148,7 @@ void tal_schema_release(const tal_key *keys, void *base) {
     if (key->type == TAL_KEY_GROUP)
       tal_schema_release(key->keys, place);
     bool owned = key->type == TAL_KEY_TEXT || key->type == TAL_KEY_WHOLES || key->type == TAL_KEY_PAIRS ||
-                 key->type == TAL_KEY_LIST;
+                 key->type == TAL_KEY_LIST || key->type == TAL_KEY_FORCED;
     if (!owned)
       continue;
     void *memory;

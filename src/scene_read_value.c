@@ -209,6 +209,68 @@ static void read_pairs(tal_report *report, const tal_key *key, const tal_node *n
   store_or_drop(key, base, values, node->count, good);
 }
 
+// ---- forced grains ----
+
+static const tal_key forced_id = {.name = "", .type = TAL_KEY_WHOLE, .low = 0, .high = 1e8};
+static const tal_key forced_random = {.name = "random", .type = TAL_KEY_WHOLE, .low = 1, .high = 1e6};
+static const tal_key forced_margin = {
+    .name = "margin", .type = TAL_KEY_REAL, .unit = "mean diameters", .high = HUGE_VAL};
+
+static void read_drawn(tal_report *report, const tal_node *node, const tal_trail *at, tal_scene_forced *out) {
+  for (const tal_node *child = node->child; child; child = child->next) {
+    tal_trail here = {at, child->key, 0};
+    if (strcmp(child->key, "random") == 0)
+      read_whole(report, &forced_random, child, &here, &out->random);
+    else if (strcmp(child->key, "margin") == 0)
+      read_real(report, &forced_margin, child, &here, &out->margin);
+    else
+      tal_walk_complain(report, child, &here, "unknown key; accepted: random, margin");
+  }
+  tal_trail here = {at, "random", 0};
+  if (!tal_node_get(node, "random"))
+    tal_walk_wrong(report, &forced_random, node, &here, "is missing", "");
+}
+
+static void read_listed(tal_report *report, const tal_node *node, const tal_trail *at, tal_scene_forced *out) {
+  int64_t *ids = tal_alloc(node->count, sizeof *ids);
+  bool good = true;
+  size_t k = 0;
+  for (const tal_node *child = node->child; child; child = child->next, k++) {
+    tal_trail item = {at, NULL, k};
+    good = read_whole(report, &forced_id, child, &item, &ids[k]) && good;
+    for (size_t j = 0; good && j < k; j++)
+      if (ids[j] == ids[k]) {
+        tal_walk_complain(report, child, &item, "is listed already; accepted: each grain once");
+        good = false;
+      }
+  }
+  if (!good) {
+    free(ids);
+    return;
+  }
+  free(out->ids);
+  *out = (tal_scene_forced){.ids = ids, .count = node->count, .margin = out->margin, .many = true};
+}
+
+static void read_forced(tal_report *report, const tal_key *key, const tal_node *node, const tal_trail *at,
+                        tal_scene_forced *out) {
+  out->margin = 10;
+  int64_t id = 0;
+  if (node->kind == TAL_NODE_MAP) {
+    read_drawn(report, node, at, out);
+  } else if (node->kind == TAL_NODE_LIST && node->count) {
+    read_listed(report, node, at, out);
+  } else if (node->kind != TAL_NODE_SCALAR || node->null || node->quoted) {
+    tal_walk_wrong(report, key, node, at, "is no choice of grains", "");
+  } else if (tal_read_whole(node->text, &id) == TAL_NUMBER_OK && id >= 0) {
+    free(out->ids);
+    *out = (tal_scene_forced){.ids = tal_alloc(1, sizeof *out->ids), .count = 1, .margin = 10};
+    out->ids[0] = id;
+  } else if (strcmp(node->text, "nearest") != 0) {
+    complain_scalar(report, key, node, at, "is no choice of grains", "");
+  }
+}
+
 void tal_read_plain(tal_report *report, const tal_key *key, const tal_node *node, char *base, const tal_trail *at) {
   void *place = base + key->offset;
   if (key->type == TAL_KEY_REAL)
@@ -227,4 +289,6 @@ void tal_read_plain(tal_report *report, const tal_key *key, const tal_node *node
     read_wholes(report, key, node, at, base);
   if (key->type == TAL_KEY_PAIRS)
     read_pairs(report, key, node, at, base);
+  if (key->type == TAL_KEY_FORCED)
+    read_forced(report, key, node, at, place);
 }

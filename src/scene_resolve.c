@@ -84,7 +84,7 @@ static void resolve_cut(tal_scene *scene) {
 // Shear and deform know no boundary but the minimal one; method and order belong to it.
 static void resolve_boundary(tal_scene_stage *stage, const tal_node *node) {
   const char *kind = stage->kind ? stage->kind : "";
-  bool deforms = strcmp(kind, "shear") == 0 || strcmp(kind, "deform") == 0;
+  bool deforms = tal_word_among(kind, "shear deform spin");
   if (deforms)
     stage->boundary = named("minimal", tal_boundary_choices);
   const double none = nan("");
@@ -122,12 +122,14 @@ static void resolve_stages(tal_scene *scene, tal_node *root, tal_report *report)
         stage->timeout = 20 * stage->ramp + 20;
     }
     resolve_boundary(stage, node);
-    if (!tal_word_among(kind, "compress shear deform") || tal_node_get(node, "pressure"))
+    if (!tal_word_among(kind, "compress shear deform spin") || tal_node_get(node, "pressure"))
       continue;
     stage->pressure = pressure;
     char key[64];
     snprintf(key, sizeof key, "stages[%zu].pressure", s);
-    if (!confined)
+    if (!confined && strcmp(kind, "spin") == 0)
+      stage->boundary = stage->method = NULL; // nothing presses
+    else if (!confined)
       tal_report_add(report, node, key,
                      "is missing and no confine stage comes before; accepted: a number in Pa > 0, or a confine stage");
   }

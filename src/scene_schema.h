@@ -17,6 +17,7 @@ typedef enum tal_key_type {
   TAL_KEY_PAIRS,  // owned double (*)[2] array and its count
   TAL_KEY_GROUP,  // mapping, a struct
   TAL_KEY_LIST,   // list of mappings, owned array of structs and its count
+  TAL_KEY_FORCED, // tal_scene_forced: `nearest`, an id, a list of ids, or {random: K, margin: M}
   TAL_KEY_TREE    // anything, `note` says what; the tree's owner reads it, the struct keeps nothing
 } tal_key_type;
 

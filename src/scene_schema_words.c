@@ -127,6 +127,10 @@ void tal_key_accepted(const tal_key *key, char *out, size_t size) {
   case TAL_KEY_LIST:
     accepted_group(key, "a list of mappings", out, size);
     break;
+  case TAL_KEY_FORCED:
+    snprintf(out, size,
+             "nearest, a grain's id, a list of ids, or {random: how many, margin: mean diameters from the rim}");
+    break;
   case TAL_KEY_TREE:
     snprintf(out, size, "%s", key->note);
     break;

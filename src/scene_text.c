@@ -61,6 +61,7 @@ static bool is_set(const tal_key *key, const char *base) {
     return group_is_set(key, place);
   case TAL_KEY_BOOL:
   case TAL_KEY_WHOLES:
+  case TAL_KEY_FORCED:
     return true;
   case TAL_KEY_TREE:
     return false;
@@ -108,6 +109,21 @@ static void write_pairs(FILE *out, const tal_key *key, const char *base) {
   fputc(']', out);
 }
 
+static void write_forced(FILE *out, const tal_scene_forced *forced) {
+  if (forced->random) {
+    fprintf(out, "{random: %lld, margin: ", (long long)forced->random);
+    write_real(out, forced->margin);
+    fputc('}', out);
+  } else if (!forced->count) {
+    fputs("nearest", out);
+  } else {
+    fputs(forced->many ? "[" : "", out);
+    for (size_t k = 0; k < forced->count; k++)
+      fprintf(out, "%s%lld", k ? ", " : "", (long long)forced->ids[k]);
+    fputs(forced->many ? "]" : "", out);
+  }
+}
+
 static void write_scalar(FILE *out, const tal_key *key, const char *base) {
   const char *place = base + key->offset;
   if (key->type == TAL_KEY_REAL)
@@ -126,6 +142,8 @@ static void write_scalar(FILE *out, const tal_key *key, const char *base) {
     write_wholes(out, key, base);
   if (key->type == TAL_KEY_PAIRS)
     write_pairs(out, key, base);
+  if (key->type == TAL_KEY_FORCED)
+    write_forced(out, (const tal_scene_forced *)place);
 }
 
 // `bullet`: the first line carries the "- " of a list item, two columns to the left of `indent`.

@@ -6,6 +6,7 @@
 #include "damping.h"
 #include "effects.h"
 #include "energy.h"
+#include "forced.h"
 #include "forces.h"
 #include "integrate.h"
 #include "stage.h"
@@ -138,7 +139,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   set_graph(sim);
   for (size_t w = 0; w < scene->wall_count; w++)
     add_wall(sim, &scene->walls[w]);
-  if ((status = check_scene_step(sim, err))) {
+  if ((status = tal_forced_check(sim, err)) || (status = check_scene_step(sim, err))) {
     tal_sim_free(sim);
     return status;
   }
@@ -312,7 +313,9 @@ void tal_sim_restored(tal_sim *sim) {
   sim->stage = plan ? tal_stage_find(plan->kind) : NULL;
   sim->boundary = NULL;
   sim->boundary_moved = true;
-  if (plan) {
+  if (plan && !sim->run.stage_begun)
+    sim->stage = NULL;
+  if (sim->stage) {
     sim->dt = tal_step_length(sim, sim->run.stage_step);
     sim->friction = isnan(plan->friction) ? sim->scene->material.friction : plan->friction;
     if (plan->pressure > 0)

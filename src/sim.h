@@ -61,6 +61,7 @@
   X(int64_t, arc_top_right, "1", "place on the loop where the right arc ends")                                         \
   X(int64_t, arc_top_left, "1", "place on the loop where the left arc begins")                                         \
   X(double, rest, "1", "mean unbalanced force over mean contact force, averaged over the last window")                 \
+  X(int64_t, forced, "1", "1 + index of the grain whose spin is imposed; 0: none")                                     \
   X(int64_t, stage_done, "1", "1 once the current stage has reached its end")                                          \
   X(double, friction_work, "J", "work on grains by tangential forces that were solved implicitly")                     \
   X(double, damping_work, "J", "work on grains by viscous forces that were solved implicitly")                         \

@@ -2,8 +2,13 @@
 
 #include <string.h>
 
-static const tal_stage *const stages[] = {&tal_stage_free,  &tal_stage_confine, &tal_stage_compress,
-                                          &tal_stage_shear, &tal_stage_deform,  NULL};
+static const tal_stage *const stages[] = {&tal_stage_free,
+                                          &tal_stage_confine,
+                                          &tal_stage_compress,
+                                          &tal_stage_shear,
+                                          &tal_stage_deform,
+                                          &tal_stage_spin,
+                                          NULL};
 
 const tal_stage *tal_stage_find(const char *name) {
   for (const tal_stage *const *k = stages; *k; k++)

@@ -24,6 +24,7 @@ struct tal_stage {
 
 const tal_stage *tal_stage_find(const char *name);
 
-extern const tal_stage tal_stage_free, tal_stage_confine, tal_stage_compress, tal_stage_shear, tal_stage_deform;
+extern const tal_stage tal_stage_free, tal_stage_confine, tal_stage_compress, tal_stage_shear, tal_stage_deform,
+    tal_stage_spin;
 
 #endif

@@ -6,6 +6,7 @@
 #include "damping.h"
 #include "effects.h"
 #include "energy.h"
+#include "forced.h"
 #include "forces.h"
 #include "integrate.h"
 #include "law.h"
@@ -64,7 +65,9 @@ void tal_step_effects(tal_sim *sim) {
     effects |= TAL_EFFECT_BOUNDARY;
   if (sim->walls.count)
     effects |= TAL_EFFECT_WALLS;
-  if (any_held_motion(&sim->grains))
+  if (sim->run.forced)
+    effects |= TAL_EFFECT_SPIN;
+  if (sim->run.forced || any_held_motion(&sim->grains))
     effects |= TAL_EFFECT_HELD;
   if ((effects & (TAL_EFFECT_FRICTION | TAL_EFFECT_DAMPING)) && tal_integrator_find(scheme(sim))->implicit)
     effects |= TAL_EFFECT_IMPLICIT;
@@ -149,6 +152,7 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   run->stage_done = 0;
   run->stage_begun = 1;
   run->correcting_power = 0;
+  tal_forced_release(sim);
   tal_status status = sim->stage->begin(sim, plan, err);
   if (status)
     return status;

@@ -101,6 +101,7 @@ typedef struct tal_study {
   tal_study_seeds seeds;
   tal_study_reference reference;
   tal_study_sets common;       // keys changed in every run
+  const char *from;            // checkpoint that every run begins from, NULL: none
   tal_study_setting *settings; // owned; the reference's own last
   size_t setting_count;
   size_t reference_setting;

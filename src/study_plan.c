@@ -16,7 +16,7 @@ void tal_study_folder(char *path, size_t size, const char *dir, const tal_study_
 
 char **tal_study_words(const tal_study *study, const tal_study_run *run, const char *dir) {
   const tal_study_sets *own = &study->settings[run->setting].sets;
-  const size_t count = study->common.count + own->count, most = 2 * count + 12;
+  const size_t count = study->common.count + own->count, most = 2 * count + 14;
   char **words = tal_alloc(most, sizeof *words), folder[TAL_PATH_SIZE], seed[32];
   size_t n = 0;
   tal_study_folder(folder, sizeof folder, dir, run);
@@ -24,6 +24,10 @@ char **tal_study_words(const tal_study *study, const tal_study_run *run, const c
   const char *const head[] = {"run", study->scene_path, "-o", folder, "-t", "1", "-q", "--no-figures"};
   for (size_t k = 0; k < sizeof head / sizeof *head; k++)
     words[n++] = tal_strdup(head[k]);
+  if (study->from) {
+    words[n++] = tal_strdup("--from");
+    words[n++] = tal_strdup(study->from);
+  }
   for (size_t k = 0; k <= count; k++) {
     words[n++] = tal_strdup("--set");
     words[n++] = tal_strdup(k < study->common.count ? study->common.item[k].text

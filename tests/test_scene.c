@@ -485,7 +485,7 @@ static void test_keys(void **state) {
               {"contact", "contact.vR", "material"},
               {"grains.radius.sieve", "grains.radius.passing", "grains.radius.median"},
               {"contact.tangential", "regularised with friction, else none", "exponent"}};
-  static const char *const unknown[] = {"foo", "stages.spin", "material.youn", "contact.hurtz", ".", "stages."};
+  static const char *const unknown[] = {"foo", "stages.twist", "material.youn", "contact.hurtz", ".", "stages."};
   bool found;
   for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
     char *text = printed_keys(rows[i].what, &found);
@@ -517,7 +517,7 @@ static void test_json_schema(void **state) {
   tal_node *young = tal_node_find(root, "properties.material.properties.young");
   assert_string_equal(tal_node_find(young, "exclusiveMinimum")->text, "0");
   assert_string_equal(tal_node_find(root, "properties.seed.default")->text, "1");
-  assert_int_equal(tal_node_find(root, "properties.stages.items.allOf")->count, 5);
+  assert_int_equal(tal_node_find(root, "properties.stages.items.allOf")->count, 6);
   assert_int_equal(tal_node_find(root, "properties.walls.items.required")->count, 2);
   tal_tree_clear(&tree);
   free(text);
