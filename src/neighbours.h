@@ -1,4 +1,4 @@
-// The neighbour list: candidate slots within a skin, and for each grain its slots in the order of its partners' ids.
+// The neighbour list: candidate slots within a skin, and for each grain its slots in the order of its partners.
 #ifndef TAL_NEIGHBOURS_H
 #define TAL_NEIGHBOURS_H
 

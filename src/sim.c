@@ -8,6 +8,7 @@
 #include "energy.h"
 #include "forces.h"
 #include "integrate.h"
+#include "order.h"
 #include "stage.h"
 #include "step.h"
 
@@ -71,6 +72,7 @@ static tal_status make_grains(tal_sim *sim, tal_error *err) {
   sim->constants.mean_radius = mean(packing.r, packing.count);
   sim->constants.thickness = isnan(scene->grains.thickness) ? 2 * sim->constants.mean_radius : scene->grains.thickness;
   tal_packing_grains(&packing, scene, sim->constants.thickness, &sim->grains);
+  tal_order_grains(&sim->grains);
   sim->packing_solid_fraction = packing.solid_fraction;
   sim->packing_coordination = packing.coordination;
   sim->packing_overlap = packing.largest_overlap;
