@@ -146,10 +146,10 @@ static void measure(const variant *v, int n) {
   tal_scene scene;
   const double before = bytes_used();
   tal_sim *sim = create(v, n, &scene);
-  steps(sim, n > 200000 ? 30 : 300);
+  const int count = n < 4000 ? 2000 : (int)(8e6 / n) + 5;
+  steps(sim, count < 300 ? count : 300);
   const double bytes = bytes_used() - before, grains = (double)sim->grains.count;
   uint64_t rebuilds = sim->neighbours.rebuilds;
-  int count = n > 200000 ? 25 : n > 20000 ? 250 : 2500;
   double step = phase(one_step, sim, count), ns = 1e9 * step / grains;
   double listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
   printf("%-38s %8d %7.1f %7.1f %7.1f %6.2f %6.2f %6.0f", v->name, n, 1e3 / ns, ns, 1e9 * step / (double)touching(sim),
