@@ -4,6 +4,7 @@
 #include "checkpoint.h"
 
 #include "files.h"
+#include "forces.h"
 #include "store.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,6 +13,7 @@
 // A field list's `kept` chooses between these.
 #define IF_STATE(...) __VA_ARGS__
 #define IF_WORK(...)
+#define IF_SEEN(...)
 #define PUT_int64_t tal_store_put_integer
 #define PUT_double  tal_store_put_number
 #define GET_int64_t tal_store_get_integer
@@ -143,6 +145,7 @@ tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim 
                                 const tal_run_files *files, tal_error *err) {
   tal_store store;
   tal_implicit_save(sim);
+  tal_forces_expand(sim);
   tal_store_begin(&store);
   put_head(&store, sim, scene_text, files);
   put_frames(&store, files);

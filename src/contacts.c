@@ -28,3 +28,25 @@ void tal_contacts_swap(tal_contacts *a, tal_contacts *b) {
   *a = *b;
   *b = held;
 }
+
+#define IF_STATE(...)
+#define IF_WORK(...)
+#define IF_SEEN(...) __VA_ARGS__
+
+void tal_contacts_reserve_unseen(tal_contacts *contacts, size_t capacity) {
+  tal_contacts_reserve(contacts, capacity);
+  tal_contacts_hide(contacts);
+}
+
+void tal_contacts_show(tal_contacts *contacts) {
+#define X(type, name, unit, kept, meaning)                                                                             \
+  IF_##kept(if (!contacts->name) contacts->name = tal_alloc(contacts->capacity, sizeof(type));)
+  TAL_CONTACT_FIELDS(X)
+#undef X
+}
+
+void tal_contacts_hide(tal_contacts *contacts) {
+#define X(type, name, unit, kept, meaning) IF_##kept(free(contacts->name); contacts->name = NULL;)
+  TAL_CONTACT_FIELDS(X)
+#undef X
+}

@@ -15,6 +15,8 @@ void tal_forces_step(tal_sim *sim, double dt, double credit);
 void tal_forces_sweep(tal_sim *sim, double dt);
 // Room for a record of every slot, which the caller fills.
 void tal_forces_keep(tal_sim *sim);
+// The memory of what observers were shown goes back.
+void tal_forces_forget(tal_sim *sim);
 // nx ... ft of the wall slots alone.
 void tal_forces_sweep_walls(tal_sim *sim, double dt);
 // The same as tal_forces_step from the force records as they stand.

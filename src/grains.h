@@ -7,7 +7,7 @@
 
 // X(type, name, unit, kept, meaning). kept: STATE is what a checkpoint holds, WORK can be recomputed.
 #define TAL_GRAIN_FIELDS(X)                                                                                            \
-  X(int64_t, id, "1", STATE, "identity, 0-based, in packing order")                                                           \
+  X(int64_t, id, "1", STATE, "identity, 0-based, in packing order")                                                    \
   X(double, x, "m", STATE, "centre")                                                                                   \
   X(double, y, "m", STATE, "centre")                                                                                   \
   X(double, r, "m", STATE, "radius")                                                                                   \

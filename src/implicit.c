@@ -231,6 +231,7 @@ void tal_implicit_step(tal_sim *sim, double credit) {
     sim->run.correcting_work += credit * sim->run.correcting_power;
   }
   if (sim->implicit.all_free) {
+    tal_forces_forget(sim);
     take_velocities(sim, credit);
     book(sim, done, credit);
     return;

@@ -99,7 +99,7 @@ static void list_pairs(tal_sim *sim) {
   geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
-  tal_contacts_reserve(&fresh, pairs->count + pairs->count / 16 + 64);
+  tal_contacts_reserve_unseen(&fresh, pairs->count + pairs->count / 16 + 64);
   fresh.count = pairs->count;
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
@@ -107,6 +107,7 @@ static void list_pairs(tal_sim *sim) {
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
+  geo_pairs_clear(pairs);
   measure_ring(sim);
 }
 
@@ -164,17 +165,21 @@ static void list_walls(tal_sim *sim) {
   tal_contacts_clear(&fresh);
 }
 
+void tal_neighbours_forget(tal_neighbours *neighbours) {
+  free(neighbours->first);
+  free(neighbours->slot);
+  neighbours->first = neighbours->slot = NULL;
+}
+
 // Deals the slots out to their grains: counts, then fills in slot order.
-static void list_incidences(tal_sim *sim) {
+void tal_neighbours_deal(tal_sim *sim) {
   tal_neighbours *n = &sim->neighbours;
   const tal_contacts *slots = &sim->pairs;
   size_t count = sim->grains.count;
-  if (n->slot_capacity < 2 * slots->count) {
-    free(n->slot);
-    n->slot_capacity = 2 * slots->capacity;
-    n->slot = tal_alloc(n->slot_capacity, sizeof *n->slot);
-  }
-  memset(n->first, 0, (count + 1) * sizeof *n->first);
+  if (n->first)
+    return;
+  n->first = tal_alloc(count + 1, sizeof *n->first);
+  n->slot = tal_alloc(2 * slots->count, sizeof *n->slot);
   for (size_t c = 0; c < slots->count; c++) {
     n->first[slots->i[c] + 1]++;
     n->first[slots->j[c] + 1]++;
@@ -193,10 +198,8 @@ static void list_incidences(tal_sim *sim) {
 static void list_all(tal_sim *sim) {
   tal_neighbours *n = &sim->neighbours;
   const tal_grains *g = &sim->grains;
-  if (n->grain_capacity != g->count || !n->first) {
-    free(n->first);
+  if (n->grain_capacity != g->count) {
     free(n->wall_first);
-    n->first = tal_alloc(g->count + 1, sizeof *n->first);
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
     free(sim->grain_records);
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
@@ -205,7 +208,7 @@ static void list_all(tal_sim *sim) {
   tal_implicit_save(sim);
   list_pairs(sim);
   list_walls(sim);
-  list_incidences(sim);
+  tal_neighbours_forget(n);
   n->rebuilds++;
 }
 

@@ -85,6 +85,7 @@ static void set_graph(tal_sim *sim) {
   tal_graph_init(&sim->graph);
   sim->graph.backend = geo_delaunay_backend_find(plan->backend);
   sim->graph.power = plan->power;
+  sim->graph.edges_on_demand = true;
   sim->graph.gap_limit = plan->peel * 2 * sim->constants.mean_radius;
 }
 
@@ -209,6 +210,7 @@ tal_observed tal_sim_driving(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   tal_forces_expand(sim);
   tal_forces_resultants(sim);
+  tal_graph_index_edges(&sim->graph);
   return (tal_observed){.grains = g,
                         .pairs = &sim->pairs,
                         .walls = &sim->wall_contacts,
