@@ -1,7 +1,7 @@
 // Grain-steps per second on one core in a confined assembly under compression, and the share of each phase of a step.
 // CPU time of the one thread, median of REPEATS; the assembly is a drop-and-roll packing whose radii are swollen until
 // its contacts carry the overlap of 100 kPa. Usage: bench_step [-v NAME] [N ...]: the
-// variants whose name begins so (all), the sizes (4000 100000).
+// variants whose name begins so (all), the sizes (4000 100000). bench_step -w FILE N: writes the assembly for LAMMPS.
 #include "effects.h"
 #include "forces.h"
 #include "integrate.h"
@@ -162,6 +162,32 @@ static void measure(const variant *v, int n) {
   tal_scene_clear(&scene);
 }
 
+// The assembly of the spring law as a data file of LAMMPS, for peers.sh.
+static int write_data(const char *path, int n) {
+  tal_scene scene;
+  tal_sim *sim = create(&variants[1], n, &scene);
+  steps(sim, 300);
+  const tal_grains *g = &sim->grains;
+  double low[2] = {(double)INFINITY, (double)INFINITY}, high[2] = {-(double)INFINITY, -(double)INFINITY};
+  for (size_t i = 0; i < g->count; i++) {
+    low[0] = fmin(low[0], g->x[i] - g->r[i]);
+    high[0] = fmax(high[0], g->x[i] + g->r[i]);
+    low[1] = fmin(low[1], g->y[i] - g->r[i]);
+    high[1] = fmax(high[1], g->y[i] + g->r[i]);
+  }
+  FILE *to = fopen(path, "w");
+  if (!to)
+    return 1;
+  fprintf(to, "confined assembly\n\n%zu atoms\n1 atom types\n%.9g %.9g xlo xhi\n%.9g %.9g ylo yhi\n", g->count, low[0],
+          high[0], low[1], high[1]);
+  fprintf(to, "-1e-3 1e-3 zlo zhi\n\nAtoms # sphere\n\n");
+  for (size_t i = 0; i < g->count; i++)
+    fprintf(to, "%zu 1 %.17g 1 %.17g %.17g 0\n", i + 1, 2 * g->r[i], g->x[i], g->y[i]);
+  tal_sim_free(sim);
+  tal_scene_clear(&scene);
+  return fclose(to) != 0;
+}
+
 // The variants whose name begins with `wanted`.
 static void measure_all(const char *wanted, int n) {
   for (size_t v = 0; v < sizeof variants / sizeof *variants; v++)
@@ -170,6 +196,8 @@ static void measure_all(const char *wanted, int n) {
 }
 
 int main(int argc, char **argv) {
+  if (argc == 4 && strcmp(argv[1], "-w") == 0)
+    return write_data(argv[2], atoi(argv[3]));
   const bool chosen = argc > 2 && strcmp(argv[1], "-v") == 0;
   const char *wanted = chosen ? argv[2] : "";
   const int first = chosen ? 3 : 1;
