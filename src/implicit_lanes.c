@@ -149,7 +149,7 @@ static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t la
   s->filler[lane] = false;
   s->stiffness[lane] = slots->stiffness[c];
   s->damping[lane] = slots->damping[c];
-  s->friction[lane] = slots->friction[c];
+  s->friction[lane] = wall ? slots->friction[c] : sim->friction;
   s->radius_i[lane] = g->r[i];
   s->reach[lane] = g->r[i] + (wall ? 0 : g->r[j]);
   s->share_i[lane] = wall ? 1 : 0.5;

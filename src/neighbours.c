@@ -45,8 +45,6 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   slots->stiffness[c] =
       sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
   slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
-  slots->friction[c] = sim->friction;
-  slots->spring[c] = slots->spring_stiffness[c] = slots->viscous[c] = 0;
 }
 
 static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t w) {
@@ -66,6 +64,8 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
 // Both lists ascend by (i, j): one merge carries the histories over.
 static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
   size_t o = 0;
+  if (!old->spring)
+    return;
   for (size_t c = 0; c < slots->count; c++) {
     while (o < old->count && (old->i[o] < slots->i[c] || (old->i[o] == slots->i[c] && old->j[o] < slots->j[c])))
       o++;
@@ -99,11 +99,12 @@ static void list_pairs(tal_sim *sim) {
   geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
-  tal_contacts_reserve_unseen(&fresh, pairs->count + pairs->count / 16 + 64);
+  const bool past = sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT);
+  tal_contacts_reserve_pairs(&fresh, pairs->count + pairs->count / 16 + 64, past);
   fresh.count = pairs->count;
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
-  if (sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT))
+  if (past)
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);

@@ -112,7 +112,9 @@ static void pick_slots(tal_contacts *to, const tal_contacts *from, const int64_t
   tal_contacts_init(to);
   tal_contacts_reserve(to, from->count);
   to->count = from->count;
-#define X(type, name, unit, kept, meaning) pick(to->name, from->name, slot, from->count, sizeof *to->name);
+#define X(type, name, unit, kept, meaning)                                                                             \
+  if (from->name)                                                                                                      \
+    pick(to->name, from->name, slot, from->count, sizeof *to->name);
   TAL_CONTACT_FIELDS(X)
 #undef X
   for (size_t c = 0; c < from->count; c++) {
