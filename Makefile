@@ -13,6 +13,9 @@ OUT     := $(BUILD)$(if $(filter-out native,$(MODE)),-$(MODE))
 PACKAGES := gsl yaml-0.1 hdf5 libxxhash qhull_r
 NEEDED   := $(if $(CLANG),clang libomp-dev,gcc) g++ pkg-config libgsl-dev libyaml-dev libhdf5-dev libxxhash-dev libqhull-dev
 DEBIAN   := $(NEEDED) libcgal-dev gnuplot-nox fonts-dejavu-core libcmocka-dev
+# What the experiments' analysis draws with; nothing else needs it.
+ANALYSIS := python3-numpy python3-h5py python3-matplotlib
+export PYTHON ?= /usr/bin/python3
 # CGAL is header-only and optional, and the faster of the two triangulation backends; qhull is always there.
 HAVE_CGAL := $(shell $(CXX) -E -x c++ -include CGAL/version.h /dev/null >/dev/null 2>&1 && echo yes)
 
@@ -44,7 +47,8 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers format format-check install clean deps check-deps
+.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers format format-check install clean deps \
+  deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -74,13 +78,15 @@ $(OUT)/flags: check-deps
 check-deps:
 	@sh tests/install-deps.sh --check $(NEEDED)
 	@$(if $(HAVE_CGAL),true,echo "talus: CGAL not found: building with qhull only (libcgal-dev gives the faster backend)")
-deps:
+deps-program:
 	@sh tests/install-deps.sh $(DEBIAN)
+deps:
+	@sh tests/install-deps.sh $(DEBIAN) $(ANALYSIS)
 
-demo: deps
+demo: deps-program
 	@$(MAKE) --no-print-directory $(JOBS) all
 	@sh experiments/biaxial/demo.sh $(OUT)/talus
-test: deps
+test: deps-program
 	@$(MAKE) --no-print-directory $(JOBS) run-tests
 build-tests: $(OUT)/talus $(TESTS) $(BENCHES)
 run-tests: $(OUT)/talus $(TESTS)
@@ -93,6 +99,7 @@ tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
+	@TALUS=$(abspath $(OUT)/talus) $(PYTHON) experiments/test_talus.py
 	@for e in experiments/*/run.sh; do echo "$$e --short"; \
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)

@@ -78,17 +78,20 @@ static void press_arc(tal_sim *sim, int64_t from, size_t edges) {
   }
 }
 
-// The horizontal part of the pressure on the straight line between two places.
-static void press_chord(tal_sim *sim, int64_t from, int64_t to) {
-  const int32_t *node = sim->graph.loop.node;
-  tal_grains *g = &sim->grains;
-  double fx = -0.5 * sim->run.pressure * sim->constants.thickness * (g->y[node[to]] - g->y[node[from]]);
-  g->bx[node[from]] += fx;
-  g->bx[node[to]] += fx;
-}
-
 static size_t edges_between(const geo_loop *loop, int64_t from, int64_t to) {
   return (size_t)(to >= from ? to - from : to + (int64_t)loop->count - from);
+}
+
+// The horizontal part of the pressure on the straight line between two places, shared by the grains of the loop from
+// the one to the other.
+static void press_chord(tal_sim *sim, int64_t from, int64_t to) {
+  const geo_loop *loop = &sim->graph.loop;
+  tal_grains *g = &sim->grains;
+  const size_t grains = edges_between(loop, from, to) + 1;
+  const double rise = g->y[loop->node[to]] - g->y[loop->node[from]];
+  const double fx = -sim->run.pressure * sim->constants.thickness * rise / (double)grains;
+  for (size_t k = 0; k < grains; k++)
+    g->bx[loop->node[((size_t)from + k) % loop->count]] += fx;
 }
 
 static void apply(tal_sim *sim) {

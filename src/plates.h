@@ -7,7 +7,7 @@
 // Puts the plates against the outermost grains unless they are there. Same material as the grains.
 void tal_plates_ensure(tal_sim *sim);
 // Marks in sim->graph.side the grains at the bottom (1) and the top plate (2): those within a hundredth of a mean
-// diameter of touching it.
+// diameter of touching it and another grain. One that left the assembly along a plate is none.
 void tal_plates_mark(tal_sim *sim);
 double tal_plates_distance(const tal_sim *sim); // [m]
 // Both plates approach each other at `speed` [m/s] in all, half each.

@@ -278,9 +278,9 @@ static tal_status run_opened(job *this, const tal_run_options *options, tal_run_
   return status;
 }
 
-// A thousand grains wait longer for a second thread than it saves.
+// A thousand grains wait longer for a second thread than it saves. OMP_NUM_THREADS is the limit where it is set.
 int tal_run_threads(size_t grains, int asked) {
-  int useful = 1 + (int)(grains / 2000), there = omp_get_num_procs();
+  int useful = 1 + (int)(grains / 2000), there = omp_get_max_threads();
   int threads = asked > 0 ? asked : useful < there ? useful : there;
   omp_set_num_threads(threads);
   return threads;

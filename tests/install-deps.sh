@@ -25,6 +25,7 @@ is_there() {
     libyaml-dev) has_library yaml-0.1 ;;
     libomp-dev) echo | clang -fopenmp -E -x c -include omp.h - >/dev/null 2>&1 ;;
     libclang-rt-*-dev) has_file '/usr/lib/llvm-*/lib/clang/*/lib/linux/libclang_rt.tsan-*.a' ;;
+    python3-*) "${PYTHON:-/usr/bin/python3}" -c "import ${1#python3-}" 2>/dev/null ;;
     *) has_command "$1" ;;
   esac
 }

@@ -12,7 +12,7 @@ run() { # folder, scene file, settings...
   shift 2
   resume=
   if [ -e "$out/$folder/checkpoint.h5" ]; then resume=--resume; fi
-  "$talus" run "$here/$file" -o "$out/$folder" $resume "$@"
+  "$talus" run -t 1 "$here/$file" -o "$out/$folder" $resume "$@"
 }
 
 if [ "${1:-}" = --short ]; then

@@ -14,7 +14,7 @@ run() { # folder, settings...
   shift
   resume=
   if [ -e "$folder/checkpoint.h5" ]; then resume=--resume; fi
-  "$talus" run "$scene" -o "$folder" $resume -q --no-figures --set output.fields_every=10 "$@"
+  "$talus" run "$scene" -t 1 -o "$folder" $resume -q --no-figures --set output.fields_every=1 "$@"
 }
 
 I='stages.1.integrator={scheme: verlet, dt: 1e-5}'
@@ -39,6 +39,11 @@ part() {
   esac
 }
 
+draw() {
+  sh "$here/figures.sh" "$out"
+  "${PYTHON:-python3}" "$here/fluctuations.py" "$out" "$@"
+}
+
 if [ "${1:-}" = --short ]; then
   trap 'rm -rf "$out"' EXIT
   small='--set grains.count=150 --set pack.width=13e-3 --set stages.0.ramp=1 --set stages.0.tolerance=0.03'
@@ -48,12 +53,15 @@ if [ "${1:-}" = --short ]; then
       --set 'metrics=[{take: value, column: mean_slip, at: 2e-4}]'
   done
   # shellcheck disable=SC2086
-  run II-1 $small --set stages.1.strain=2e-4 --set "$II"
+  run II-1 $small --set stages.1.strain=2e-3 --set "$II"
+  # shellcheck disable=SC2086
+  run ours-1 $small --set stages.1.strain=2e-3
   "$talus" verify "$out/II-1"
-  sh "$here/figures.sh" "$out"
+  draw 0:0.002
+  test -s "$out/figures/fluctuations.png"
   exit 0
 fi
 
 [ $# -gt 0 ] || set -- study times ours I II III big big-III
 for name in "$@"; do part "$name"; done
-sh "$here/figures.sh" "$out"
+draw
