@@ -19,6 +19,7 @@ int tal_cli_plot(int argc, char **argv);
 int tal_cli_verify(int argc, char **argv);
 int tal_cli_keys(int argc, char **argv);
 int tal_cli_study(int argc, char **argv);
+int tal_cli_measure(int argc, char **argv);
 
 typedef struct tal_command {
   const char *name;
@@ -42,7 +43,8 @@ typedef enum tal_cli_accept {
   TAL_CLI_RESUME = 8,   // --resume
   TAL_CLI_QUIET = 16,   // -q, --quiet
   TAL_CLI_FIGURES = 32, // --no-figures
-  TAL_CLI_STUDY = 64    // --plan, --merge
+  TAL_CLI_STUDY = 64,   // --plan, --merge
+  TAL_CLI_MEASURE = 128 // --at, --window, --region, --over, --angle, --export
 } tal_cli_accept;
 
 typedef struct tal_cli_options {
@@ -52,8 +54,11 @@ typedef struct tal_cli_options {
   const char **sets;    // owned list of KEY=VALUE
   size_t set_count;
   bool resume, quiet;
-  bool figures;     // true unless --no-figures
-  bool plan, merge; // study: only write the plan, only merge
+  bool figures;                                    // true unless --no-figures
+  bool plan, merge;                                // study: only write the plan, only merge
+  const char *at, *window, *region, *over, *angle; // measure; NULL when not given
+  const char **exports;                            // owned list of fields
+  size_t export_count;
 } tal_cli_options;
 
 // Parses the words after the command `name`, which accepts the options of `accepted` and needs exactly one argument,

@@ -13,6 +13,8 @@ static const tal_command commands[] = {
     {"check", "SCENE.yaml [--set KEY=VALUE]...", "validate a scene and print what a run of it would do", tal_cli_check},
     {"impact", "SCENE.yaml [-o DIR] [--set KEY=VALUE]... [--no-figures]",
      "restitution and contact time of two mean grains over the damping: impact.csv, impact.png", tal_cli_impact},
+    {"measure", "DIR [-o OUT] [--at WHEN] [--window A:B] [--region WHERE] [--over STRAIN] [--export FIELD]...",
+     "force chains, fabric, force statistics, voids, bands of the stored fields: tables and figures", tal_cli_measure},
     {"plot", "DIR", "draw again every figure the data of a run allows", tal_cli_plot},
     {"study", "STUDY.yaml [-o DIR] [-t CORES] [--set KEY=VALUE]... [--plan | --merge] [-q] [--no-figures]",
      "turn one or two dials of a scene, over seeds; error against cost goes to DIR", tal_cli_study},
@@ -57,6 +59,15 @@ static const option_help table[] = {
     {TAL_CLI_FIGURES, {"no-figures", no_argument, NULL, 'n'}, NULL, "draw no figures at the end"},
     {TAL_CLI_STUDY, {"plan", no_argument, NULL, 'p'}, NULL, "write the plan and run nothing"},
     {TAL_CLI_STUDY, {"merge", no_argument, NULL, 'm'}, NULL, "run nothing, merge the runs that are there"},
+    {TAL_CLI_MEASURE,
+     {"at", required_argument, NULL, 'a'},
+     "WHEN,...",
+     "axial strain, t=TIME, frame=N, first, last, peak, all"},
+    {TAL_CLI_MEASURE, {"window", required_argument, NULL, 'w'}, "A:B", "frames from axial strain A to B only"},
+    {TAL_CLI_MEASURE, {"region", required_argument, NULL, 'g'}, "WHERE", "X0:X1,Y0:Y1 or disc:X,Y,R [m]"},
+    {TAL_CLI_MEASURE, {"over", required_argument, NULL, 'v'}, "STRAIN", "displacements over this axial strain (0.02)"},
+    {TAL_CLI_MEASURE, {"angle", required_argument, NULL, 'l'}, "DEGREES", "of force chains (45)"},
+    {TAL_CLI_MEASURE, {"export", required_argument, NULL, 'x'}, "FIELD", "write contacts, or contacts/fn ..., as CSV"},
     {0, {"help", no_argument, NULL, 'h'}, NULL, "this text"}};
 
 #define OPTIONS (sizeof table / sizeof *table)
@@ -96,7 +107,27 @@ static int take_threads(tal_cli_options *options, const char *name, const char *
   return TAL_OK;
 }
 
+static const char **place_of(tal_cli_options *options, int letter) {
+  switch (letter) {
+  case 'a':
+    return &options->at;
+  case 'w':
+    return &options->window;
+  case 'g':
+    return &options->region;
+  case 'v':
+    return &options->over;
+  case 'l':
+    return &options->angle;
+  default:
+    return NULL;
+  }
+}
+
 static int take(tal_cli_options *options, const char *name, int letter, const char *value) {
+  const char **place = place_of(options, letter);
+  if (place)
+    *place = value;
   switch (letter) {
   case 'o':
     if (!*value)
@@ -122,6 +153,9 @@ static int take(tal_cli_options *options, const char *name, int letter, const ch
     return TAL_OK;
   case 'm':
     options->merge = true;
+    return TAL_OK;
+  case 'x':
+    options->exports[options->export_count++] = value;
     return TAL_OK;
   default:
     return TAL_OK;
@@ -182,6 +216,7 @@ bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned 
   *options = (tal_cli_options){.figures = true};
   *exit_code = TAL_OK;
   options->sets = tal_alloc((size_t)argc + 1, sizeof *options->sets);
+  options->exports = tal_alloc((size_t)argc + 1, sizeof *options->exports);
   char **words = tal_alloc((size_t)argc + 2, sizeof *words); // getopt skips the first and reorders the rest
   words[0] = (char[]){"talus"};
   for (int i = 0; i < argc; i++)
@@ -202,6 +237,7 @@ bool tal_cli_options_parse(tal_cli_options *options, const char *name, unsigned 
 
 void tal_cli_options_clear(tal_cli_options *options) {
   free(options->sets);
+  free(options->exports);
   *options = (tal_cli_options){0};
 }
 

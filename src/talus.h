@@ -18,6 +18,7 @@
 #include "energy.h"
 #include "figures.h"
 #include "impact.h"
+#include "measure.h"
 #include "output.h"
 #include "run.h"
 #include "scene.h"
