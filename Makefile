@@ -47,8 +47,8 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests short asan tsan bench format format-check install clean deps deps-program \
-  check-deps
+.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers format format-check install clean deps \
+  deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -104,6 +104,9 @@ short: all
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)
 	@for b in $^; do $$b || exit 1; done
+# The same assembly in LAMMPS, where it is installed (package lammps).
+bench-peers: $(OUT)/tests/bench/bench_step
+	@sh tests/bench/peers.sh $<
 
 FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch])
 format:
