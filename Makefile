@@ -47,8 +47,8 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests short asan tsan bench format format-check install clean deps deps-program \
-  check-deps
+.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers format format-check install clean deps \
+  deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -99,11 +99,14 @@ tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
-	@TALUS=$(abspath $(OUT)/talus) $(PYTHON) experiments/test_talus.py
+	@for t in experiments/test_*.py experiments/*/test_*.py; do TALUS=$(abspath $(OUT)/talus) $(PYTHON) $$t || exit 1; done
 	@for e in experiments/*/run.sh; do echo "$$e --short"; \
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES)
 	@for b in $^; do $$b || exit 1; done
+# The same assembly in LAMMPS, where it is installed (package lammps).
+bench-peers: $(OUT)/tests/bench/bench_step
+	@sh tests/bench/peers.sh $<
 
 FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch])
 format:

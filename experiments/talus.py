@@ -134,10 +134,10 @@ def loop_gradient(points, vectors):
     return vectors.T @ loop_normals(points) / polygon_area(points)
 
 
-def relative_to_affine(first, last):
-    """[n, 2] displacement less the affine one: the mean displacement gradient over the loop of the first frame, and no
-    mean displacement of the loop's grains."""
-    loop, moved = first["loop/node"], displacement(first, last)
+def relative_to_affine(first, last, loop=None):
+    """[n, 2] displacement less the affine one: the mean displacement gradient over the loop of the first frame (or another
+    polygon of grains), and no mean displacement of the loop's grains."""
+    loop, moved = first["loop/node"] if loop is None else loop, displacement(first, last)
     affine = first.centres @ loop_gradient(first.centres[loop], moved[loop]).T
     return moved - affine - (moved - affine)[loop].mean(axis=0)
 

@@ -4,6 +4,7 @@
 #include "checkpoint.h"
 
 #include "files.h"
+#include "forces.h"
 #include "store.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -12,6 +13,9 @@
 // A field list's `kept` chooses between these.
 #define IF_STATE(...) __VA_ARGS__
 #define IF_WORK(...)
+#define IF_PAST(...) __VA_ARGS__
+#define IF_SEEN(...)
+#define IF_WALL(...)
 #define PUT_int64_t tal_store_put_integer
 #define PUT_double  tal_store_put_number
 #define GET_int64_t tal_store_get_integer
@@ -75,7 +79,7 @@ static size_t *kept_slots(const tal_contacts *contacts, size_t *count) {
   size_t *kept = tal_alloc(contacts->count, sizeof *kept);
   *count = 0;
   for (size_t c = 0; c < contacts->count; c++) {
-    if (contacts->overlap[c] > 0 || contacts->spring[c] != 0)
+    if (contacts->overlap[c] > 0 || (contacts->spring && contacts->spring[c] != 0))
       kept[(*count)++] = c;
   }
   return kept;
@@ -89,7 +93,7 @@ static void put_contacts(tal_store *store, const char *group, const tal_contacts
   IF_##kept({                                                                                                          \
     type *column = tal_alloc(count, sizeof *column);                                                                   \
     for (size_t k = 0; k < count; k++)                                                                                 \
-      column[k] = contacts->name[kept_slot[k]];                                                                        \
+      column[k] = contacts->name ? contacts->name[kept_slot[k]] : 0;                                                   \
     tal_store_put(store, TAL_ARRAY(#name, unit, column, count));                                                       \
     free(column);                                                                                                      \
   })
@@ -143,6 +147,7 @@ tal_status tal_checkpoint_write(const char *path, const char *previous, tal_sim 
                                 const tal_run_files *files, tal_error *err) {
   tal_store store;
   tal_implicit_save(sim);
+  tal_forces_expand(sim);
   tal_store_begin(&store);
   put_head(&store, sim, scene_text, files);
   put_frames(&store, files);
@@ -270,6 +275,7 @@ static void get_grains(tal_store *store, tal_grains *grains) {
 static void get_contacts(tal_store *store, const char *group, tal_contacts *contacts) {
   tal_store_group(store, group);
   const size_t count = tal_store_rows(store, "i");
+  tal_contacts_clear(contacts);
   tal_contacts_reserve(contacts, count);
   contacts->count = count;
 #define X(type, name, unit, kept, meaning)                                                                             \

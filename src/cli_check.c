@@ -39,7 +39,7 @@ static void print_effects(const tal_sim *sim) {
   printf("  (first stage)\nkernel        %s, mask %u\n", sim->scene->integrator.scheme, sim->effects & TAL_EFFECT_LAW);
 }
 
-// Bytes of grains and slots as they stand.
+// Bytes of grains and slots while someone looks at them.
 static double memory(const tal_sim *sim) {
   double grain = 0, slot = 0;
 #define X(type, name, unit, kept, meaning) grain += sizeof(type);
@@ -49,8 +49,9 @@ static double memory(const tal_sim *sim) {
   TAL_CONTACT_FIELDS(X)
 #undef X
   const double graph = 2 * (3 + 3) * sizeof(int32_t) + 2 * sizeof(double) + 2; // per grain: two cells, references
-  double incidences = 2.0 * sizeof(int32_t) * (double)sim->neighbours.slot_capacity / 2;
-  return (double)sim->grains.count * (grain + graph) + (double)sim->pairs.capacity * slot + incidences;
+  grain += sizeof(tal_grain_record) + sizeof(int32_t);
+  slot += sizeof(tal_force_record) + 2 * sizeof(int32_t);
+  return (double)sim->grains.count * (grain + graph) + (double)sim->pairs.capacity * slot;
 }
 
 static double clock_now(void) {

@@ -83,7 +83,9 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   const double *restrict viscous = (own ? slots->damping : slots->stiffness) + start;
   const double damping_scale = own ? 1 : sweep->damping_time;
   double unused[2][TAL_BLOCK]; // where histories go that are not to move
-  double *spring = slots->spring + start, *spring_stiffness = slots->spring_stiffness + start;
+  const bool past = effects & TAL_EFFECT_SPRING;
+  double *spring = past ? slots->spring + start : unused[0];
+  double *spring_stiffness = past ? slots->spring_stiffness + start : unused[1];
   double *new_spring = sweep->moves ? spring : unused[0];
   double *new_spring_stiffness = sweep->moves ? spring_stiffness : unused[1];
   double *restrict ex = out->force[0], *restrict ey = out->force[1], *restrict vx = out->force[2];

@@ -28,3 +28,40 @@ void tal_contacts_swap(tal_contacts *a, tal_contacts *b) {
   *a = *b;
   *b = held;
 }
+
+#define IF_STATE(past, ...) __VA_ARGS__
+#define IF_WORK(past, ...)  __VA_ARGS__
+#define IF_PAST(past, ...)                                                                                             \
+  if (past)                                                                                                            \
+  __VA_ARGS__
+#define IF_SEEN(...)
+#define IF_WALL(...)
+
+void tal_contacts_reserve_pairs(tal_contacts *contacts, size_t capacity, bool past) {
+#define X(type, name, unit, kept, meaning) IF_##kept(past, contacts->name = tal_alloc(capacity, sizeof(type));)
+  TAL_CONTACT_FIELDS(X)
+#undef X
+  contacts->capacity = capacity;
+}
+
+#undef IF_STATE
+#undef IF_WORK
+#undef IF_PAST
+#undef IF_SEEN
+#define IF_STATE(...)
+#define IF_WORK(...)
+#define IF_PAST(...)
+#define IF_SEEN(...) __VA_ARGS__
+
+void tal_contacts_show(tal_contacts *contacts) {
+#define X(type, name, unit, kept, meaning)                                                                             \
+  IF_##kept(if (!contacts->name) contacts->name = tal_alloc(contacts->capacity, sizeof(type));)
+  TAL_CONTACT_FIELDS(X)
+#undef X
+}
+
+void tal_contacts_hide(tal_contacts *contacts) {
+#define X(type, name, unit, kept, meaning) IF_##kept(free(contacts->name); contacts->name = NULL;)
+  TAL_CONTACT_FIELDS(X)
+#undef X
+}

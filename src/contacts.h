@@ -5,29 +5,32 @@
 #define TAL_CONTACTS_H
 
 #include "base.h"
+#include <stdbool.h>
 
-// X(type, name, unit, kept, meaning), as in grains.h.
+// X(type, name, unit, kept, meaning), as in grains.h. Three more kinds, without memory where nobody needs
+// them. PAST: state of laws with a history. SEEN: where someone looks at contacts between steps. WALL: of wall
+// contacts.
 #define TAL_CONTACT_FIELDS(X)                                                                                          \
   X(int32_t, i, "1", STATE, "grain, i < j")                                                                            \
   X(int32_t, j, "1", STATE, "grain, or index of the wall in a list of wall contacts")                                  \
   X(double, reach, "m", WORK, "sum of the radii; wall: the radius")                                                    \
   X(double, stiffness, "N/m^1.5 | N/m", WORK, "K of the normal law")                                                   \
   X(double, damping, "N s/m^1.5 | N s/m", WORK, "coefficient of the viscous part of the normal law")                   \
-  X(double, friction, "1", WORK, "coefficient of friction")                                                            \
-  X(double, spring, "N", STATE, "spring law: tangential spring force after the last step; implicit friction: ft")      \
-  X(double, viscous, "N", STATE, "implicit friction: viscous part of the normal force after the last step")            \
-  X(double, spring_stiffness, "N/m", STATE, "tangential stiffness after the last step (spring law only)")              \
-  X(double, nx, "1", WORK, "unit normal into i")                                                                       \
-  X(double, ny, "1", WORK, "unit normal into i")                                                                       \
-  X(double, overlap, "m", WORK, "positive in contact, negative: the gap")                                              \
-  X(double, fe, "N", WORK, "elastic part of the normal force, >= 0")                                                   \
-  X(double, fd, "N", WORK, "the rest of the normal force: viscous part after clipping, fe + fd >= 0")                  \
-  X(double, ft, "N", WORK, "tangential force on i along t")                                                            \
-  X(double, slip, "m/s", WORK, "slip speed of i against j along t, with its sign (observed states only)")
+  X(double, friction, "1", WALL, "coefficient of friction")                                                            \
+  X(double, spring, "N", PAST, "spring law: tangential spring force after the last step; implicit friction: ft")       \
+  X(double, viscous, "N", PAST, "implicit friction: viscous part of the normal force after the last step")             \
+  X(double, spring_stiffness, "N/m", PAST, "tangential stiffness after the last step (spring law only)")               \
+  X(double, nx, "1", SEEN, "unit normal into i")                                                                       \
+  X(double, ny, "1", SEEN, "unit normal into i")                                                                       \
+  X(double, overlap, "m", SEEN, "positive in contact, negative: the gap")                                              \
+  X(double, fe, "N", SEEN, "elastic part of the normal force, >= 0")                                                   \
+  X(double, fd, "N", SEEN, "the rest of the normal force: viscous part after clipping, fe + fd >= 0")                  \
+  X(double, ft, "N", SEEN, "tangential force on i along t")                                                            \
+  X(double, slip, "m/s", SEEN, "slip speed of i against j along t, with its sign (observed states only)")
 
 typedef struct tal_contacts {
   size_t count, capacity;
-#define X(type, name, unit, kept, meaning) type *name; // owned; [capacity]
+#define X(type, name, unit, kept, meaning) type *name; // owned; [capacity]; PAST, SEEN, WALL may be NULL
   TAL_CONTACT_FIELDS(X)
 #undef X
 } tal_contacts;
@@ -36,6 +39,11 @@ void tal_contacts_init(tal_contacts *contacts);
 void tal_contacts_clear(tal_contacts *contacts);
 // Room for `capacity` slots (never shrinks); contents are kept.
 void tal_contacts_reserve(tal_contacts *contacts, size_t capacity);
+// The same for an empty list of grain-grain slots: without SEEN and WALL, with PAST where the law has a history.
+void tal_contacts_reserve_pairs(tal_contacts *contacts, size_t capacity, bool past);
+// Gives the SEEN fields memory where they have none, and takes it away.
+void tal_contacts_show(tal_contacts *contacts);
+void tal_contacts_hide(tal_contacts *contacts);
 // Exchanges the contents of two lists.
 void tal_contacts_swap(tal_contacts *a, tal_contacts *b);
 

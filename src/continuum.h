@@ -28,6 +28,7 @@ typedef struct tal_graph {
   bool valid;          // false before the first refresh and after a failed one
   // Derived from mesh, loop and inside by refresh and restore.
   uint64_t indexed;        // revision of the mesh that the index belongs to
+  bool edges_on_demand;    // the three arrays of edges are made by tal_graph_index_edges alone, else by each refresh
   size_t cell_count;       // C
   int32_t *cell;           // owned; [C] triangle of each cell
   unsigned char *place;    // owned; [n] a tal_place
@@ -50,6 +51,9 @@ tal_status tal_graph_refresh(tal_graph *graph, const tal_grains *grains, tal_err
 void tal_graph_restore(tal_graph *graph, size_t n, const int32_t (*corner)[3], size_t triangle_count,
                        const int32_t *node, size_t node_count, const unsigned char *inside, const double *x,
                        const double *y);
+// Makes the index of edges where there is none, and throws it away.
+void tal_graph_index_edges(tal_graph *graph);
+void tal_graph_forget_edges(tal_graph *graph);
 // The cells that share the edge (i, j), i < j: returns how many (0, 1 or 2) and fills as many of `cell`.
 // O(log edges of i).
 size_t tal_graph_edge_cells(const tal_graph *graph, int32_t i, int32_t j, int32_t cell[2]);

@@ -13,17 +13,21 @@ void tal_graph_init(tal_graph *graph) {
   geo_loop_init(&graph->loop);
 }
 
-static void clear_index(tal_graph *graph) {
-  free(graph->cell);
-  free(graph->place);
+void tal_graph_forget_edges(tal_graph *graph) {
   free(graph->edge_start);
   free(graph->edge_end);
   free(graph->edge_cell);
-  graph->cell = NULL;
-  graph->place = NULL;
   graph->edge_start = NULL;
   graph->edge_end = NULL;
   graph->edge_cell = NULL;
+}
+
+static void clear_index(tal_graph *graph) {
+  tal_graph_forget_edges(graph);
+  free(graph->cell);
+  free(graph->place);
+  graph->cell = NULL;
+  graph->place = NULL;
   graph->cell_count = 0;
 }
 
@@ -38,15 +42,22 @@ void tal_graph_clear(tal_graph *graph) {
   *graph = (tal_graph){0};
 }
 
-// Numbers the cells in triangle order; number[T] is -1 outside.
-static void number_cells(tal_graph *graph, int32_t *number) {
-  const geo_mesh *mesh = &graph->mesh;
-  graph->cell = tal_alloc(mesh->triangle_count, sizeof *graph->cell);
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    number[t] = graph->inside[t] ? (int32_t)graph->cell_count : -1;
+// Numbers the cells in triangle order.
+static void number_cells(tal_graph *graph) {
+  graph->cell = tal_alloc(graph->mesh.triangle_count, sizeof *graph->cell);
+  for (size_t t = 0; t < graph->mesh.triangle_count; t++)
     if (graph->inside[t])
       graph->cell[graph->cell_count++] = (int32_t)t;
-  }
+}
+
+// Number of the cell of each triangle, -1 outside; owned by the caller.
+static int32_t *cell_numbers(const tal_graph *graph) {
+  int32_t *number = tal_alloc(graph->mesh.triangle_count, sizeof *number);
+  for (size_t t = 0; t < graph->mesh.triangle_count; t++)
+    number[t] = -1;
+  for (size_t c = 0; c < graph->cell_count; c++)
+    number[graph->cell[c]] = (int32_t)c;
+  return number;
 }
 
 static void place_grains(tal_graph *graph) {
@@ -59,7 +70,10 @@ static void place_grains(tal_graph *graph) {
 }
 
 // Edges of cells, compressed by their smaller grain. geo_mesh_edges gives them ascending in (i, j).
-static void index_edges(tal_graph *graph, const int32_t *number) {
+void tal_graph_index_edges(tal_graph *graph) {
+  if (graph->edge_start || !graph->cell)
+    return;
+  int32_t *number = cell_numbers(graph);
   size_t capacity = 3 * graph->mesh.triangle_count, n = graph->grain_count;
   geo_edge *edges = tal_alloc(capacity, sizeof *edges);
   size_t edge_count = geo_mesh_edges(&graph->mesh, edges), kept = 0;
@@ -78,16 +92,16 @@ static void index_edges(tal_graph *graph, const int32_t *number) {
   for (size_t i = 0; i < n; i++)
     graph->edge_start[i + 1] += graph->edge_start[i];
   free(edges);
+  free(number);
 }
 
 static void index_cells(tal_graph *graph) {
-  int32_t *number = tal_alloc(graph->mesh.triangle_count, sizeof *number);
   clear_index(graph);
-  number_cells(graph, number);
+  number_cells(graph);
   place_grains(graph);
-  index_edges(graph, number);
+  if (!graph->edges_on_demand)
+    tal_graph_index_edges(graph);
   graph->indexed = graph->mesh.revision;
-  free(number);
 }
 
 static void keep_reference(tal_graph *graph, size_t n, const double *x, const double *y) {

@@ -21,9 +21,18 @@ double tal_critical_step_pair(double stiffness, double damping, double reduced_m
   return limit(stiffness / reduced_mass, damping / reduced_mass);
 }
 
+// Of a grain-grain slot, from the centres as they stand.
+static double pair_overlap(const tal_sim *sim, size_t c) {
+  const tal_grains *g = &sim->grains;
+  const int32_t i = sim->pairs.i[c], j = sim->pairs.j[c];
+  double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j];
+  return g->r[i] + g->r[j] - sqrt(dx * dx + dy * dy);
+}
+
 // Tangent stiffness and damping of a touching slot.
-static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double *stiffness, double *damping) {
-  double root = sqrt(s->overlap[c]);
+static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double overlap, double *stiffness,
+                        double *damping) {
+  double root = sqrt(overlap);
   *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
   *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
   if (sim->effects & TAL_EFFECT_IMPLICIT)
@@ -41,11 +50,11 @@ static double sideways(const tal_sim *sim, int32_t i) {
 
 static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, double (*sum)[2]) {
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0)
+    double overlap = pairs ? pair_overlap(sim, c) : s->overlap[c], k, d;
+    if (overlap <= 0)
       continue;
-    double k, d;
     int32_t i = s->i[c], j = s->j[c];
-    slot_slopes(sim, s, c, &k, &d);
+    slot_slopes(sim, s, c, overlap, &k, &d);
     sum[i][0] += k * sideways(sim, i);
     sum[i][1] += d;
     if (!pairs)
@@ -65,7 +74,7 @@ double tal_critical_step(const tal_sim *sim) {
     least = sim->boundary->critical(sim, sum);
   const tal_contacts *s = &sim->pairs;
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0)
+    if (pair_overlap(sim, c) <= 0)
       continue;
     int32_t i = s->i[c], j = s->j[c];
     least = fmin(least, limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
@@ -94,7 +103,7 @@ double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
   double largest = 0;
   *grain = -1;
   for (size_t c = 0; c < s->count; c++) {
-    double share = s->overlap[c] / fmin(g->r[s->i[c]], g->r[s->j[c]]);
+    double share = pair_overlap(sim, c) / fmin(g->r[s->i[c]], g->r[s->j[c]]);
     if (share > largest)
       *grain = g->id[s->i[c]];
     largest = fmax(largest, share);

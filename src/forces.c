@@ -174,7 +174,7 @@ void tal_forces_step(tal_sim *sim, double dt, double credit) {
   const tal_sweep sweep = tal_sweep_of(sim, dt);
   reserve_sums(sim, threads);
   tal_forces_sweep_walls(sim, dt);
-  sim->forces_kept = false;
+  tal_forces_forget(sim);
 #pragma omp parallel num_threads(threads) if (threads > 1)
   step_range(sim, sweep, credit, omp_get_thread_num(), omp_get_num_threads());
 }

@@ -1,6 +1,6 @@
 // Contact forces. A step sums the forces of the slots grain by grain and kicks each grain as soon as its contacts are
 // done (forces.c); observers and friction solved implicitly want the force of every slot kept (forces_kept.c). Every
-// grain sums its slots in the order of its partners' ids, so any number of threads gives the same bits.
+// grain sums its slots in the order of its partners, so any number of threads gives the same bits.
 #ifndef TAL_FORCES_H
 #define TAL_FORCES_H
 
@@ -15,6 +15,8 @@ void tal_forces_step(tal_sim *sim, double dt, double credit);
 void tal_forces_sweep(tal_sim *sim, double dt);
 // Room for a record of every slot, which the caller fills.
 void tal_forces_keep(tal_sim *sim);
+// The memory of what observers were shown goes back.
+void tal_forces_forget(tal_sim *sim);
 // nx ... ft of the wall slots alone.
 void tal_forces_sweep_walls(tal_sim *sim, double dt);
 // The same as tal_forces_step from the force records as they stand.

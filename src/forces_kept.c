@@ -25,11 +25,24 @@ static void keep_block(const tal_force_block *b, tal_force_record *out, int coun
 
 void tal_forces_keep(tal_sim *sim) {
   sim->forces_kept = true;
+  tal_neighbours_deal(sim);
   if (sim->force_capacity >= sim->pairs.count)
     return;
   free(sim->force_records);
   sim->force_capacity = sim->pairs.capacity;
   sim->force_records = tal_alloc(sim->force_capacity, sizeof *sim->force_records);
+}
+
+void tal_forces_forget(tal_sim *sim) {
+  sim->forces_kept = false;
+  if (!sim->force_records)
+    return;
+  free(sim->force_records);
+  sim->force_records = NULL;
+  sim->force_capacity = 0;
+  tal_contacts_hide(&sim->pairs);
+  tal_neighbours_forget(&sim->neighbours);
+  tal_graph_forget_edges(&sim->graph);
 }
 
 static void sweep_pairs(tal_sim *sim, double dt) {
@@ -120,6 +133,7 @@ void tal_forces_expand(tal_sim *sim) {
     tal_implicit_answer(sim);
   else if (!sim->forces_kept)
     sweep_pairs(sim, 0);
+  tal_contacts_show(&sim->pairs);
   for (size_t c = 0; c < sim->pairs.count; c++)
     expand_pair(sim, c);
   tal_contacts *s = &sim->wall_contacts;

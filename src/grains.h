@@ -1,4 +1,5 @@
-// The grains: structure of arrays generated from one field list. Index order is id order (ids ascend).
+// The grains: structure of arrays generated from one field list. An index is a place in memory (order.h);
+// an id is what a grain is called by users.
 #ifndef TAL_GRAINS_H
 #define TAL_GRAINS_H
 
@@ -6,7 +7,7 @@
 
 // X(type, name, unit, kept, meaning). kept: STATE is what a checkpoint holds, WORK can be recomputed.
 #define TAL_GRAIN_FIELDS(X)                                                                                            \
-  X(int64_t, id, "1", STATE, "identity, 0-based, ascending")                                                           \
+  X(int64_t, id, "1", STATE, "identity, 0-based, in packing order")                                                    \
   X(double, x, "m", STATE, "centre")                                                                                   \
   X(double, y, "m", STATE, "centre")                                                                                   \
   X(double, r, "m", STATE, "radius")                                                                                   \

@@ -4,33 +4,12 @@
 #include "forces.h"
 #include "law.h"
 
-// Lanes of a colour, or grains, from which threads pay.
+// Grains from which threads pay.
 enum { PARALLEL_FROM = 2000 };
 // Sweeps beyond the scene's number when friction would do work, or while the tolerance is not met.
 enum { MORE_SWEEPS = 20, MOST_SWEEPS = 200 };
-enum { BLOCK = TAL_IMPLICIT_BLOCK };
-
-// ---- bodies ---------------------------------------------------------------------------------------------------------
-
-// Velocities before the kick, and after it with the boundary's forces and gravity alone.
-static void set_grains(const tal_implicit_solve *s) {
-  const tal_grains *g = &s->sim->grains;
-  const double *gravity = s->sim->scene->gravity;
-  const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
-  tal_implicit_body *body = s->system->lane.body;
-#pragma omp parallel for schedule(static) if (g->count > PARALLEL_FROM)
-  for (size_t i = 0; i < g->count; i++) {
-    const double kick = g->inverse_mass[i] > 0 ? s->kick : 0;
-    double ax = gravity[0], ay = gravity[1], w = spin ? g->omega[i] : 0;
-    if (boundary) {
-      ax += g->bx[i] * g->inverse_mass[i];
-      ay += g->by[i] * g->inverse_mass[i];
-    }
-    body[i].place = (tal_lanes){g->x[i], g->y[i], 0, 0};
-    body[i].before = (tal_lanes){g->vx[i], g->vy[i], w, w};
-    body[i].now = body[i].before + (tal_lanes){kick * ax, kick * ay, 0, 0};
-  }
-}
+// Passes that go through the tiles together.
+enum { AT_ONCE = 8 };
 
 // The nearest point of the wall to each grain that may touch it.
 static void set_walls(const tal_implicit_solve *s) {
@@ -49,99 +28,99 @@ static void set_walls(const tal_implicit_solve *s) {
 // ---- sweeps ---------------------------------------------------------------------------------------------------------
 
 static tal_implicit_works work(const tal_implicit_solve *s) {
-  tal_implicit *m = s->system;
-  const size_t blocks = (m->lanes + BLOCK - 1) / BLOCK;
+  const tal_implicit *m = s->system;
   tal_implicit_works sum = {0, 0};
-#pragma omp parallel for schedule(static) if (m->lanes > PARALLEL_FROM)
-  for (size_t k = 0; k < blocks; k++)
-    m->partial[k] = tal_implicit_work(s, k * BLOCK, (int)(m->lanes - k * BLOCK < BLOCK ? m->lanes - k * BLOCK : BLOCK));
-  for (size_t k = 0; k < blocks; k++) {
-    sum.friction += m->partial[k].friction;
-    sum.damping += m->partial[k].damping;
+  for (size_t t = 0; t < m->tiles; t++) {
+    sum.friction += m->tile[t].work.friction;
+    sum.damping += m->tile[t].work.damping;
   }
   return sum;
 }
 
-// What a boundary imposes on the loop is met by forces of its own, found beside those of the contacts.
-static void couple(const tal_implicit_solve *s, bool first) {
-  const tal_boundary *boundary = s->sim->boundary;
-  if (boundary && boundary->couple && s->advances)
-    boundary->couple(s->sim, s->kick, first);
-}
-
-// One block of the colour that begins at lane `from`.
-static void take(const tal_implicit_solve *s, tal_implicit_pass what, size_t from, size_t start, size_t to, size_t size,
-                 double factor) {
-  const int count = (int)(to - start < size ? to - start : size);
-  s->system->partial[(start - from) / size].friction = tal_implicit_take(s, what, start, count, factor);
-}
-
-// Blocks of one colour. A parallel region costs a small sample more than its work, even when it is told to be none.
-static void take_colour(const tal_implicit_solve *s, tal_implicit_pass what, size_t from, size_t to, size_t size,
-                        double factor, bool parallel) {
-  if (!parallel) {
-    for (size_t start = from; start < to; start += size)
-      take(s, what, from, start, to, size, factor);
-    return;
-  }
-#pragma omp parallel for schedule(static)
-  for (size_t start = from; start < to; start += size)
-    take(s, what, from, start, to, size, factor);
-}
-
-// One pass over all colours; the largest of what the blocks return.
-static double sweep(const tal_implicit_solve *s, tal_implicit_pass what, double factor) {
-  tal_implicit *m = s->system;
+static double largest_change(const tal_implicit_solve *s) {
   double largest = 0;
-  for (size_t colour = 0; colour < m->colour_count; colour++) {
-    const size_t from = m->first[colour], to = m->first[colour + 1];
-    const bool serial = m->serial_last && colour + 1 == m->colour_count;
-    const size_t size = serial ? TAL_IMPLICIT_VECTOR : BLOCK;
-    take_colour(s, what, from, to, size, factor, to - from > PARALLEL_FROM && !serial);
-    for (size_t k = 0; k < (to - from + size - 1) / size; k++)
-      largest = m->partial[k].friction > largest ? m->partial[k].friction : largest;
-  }
-  m->sweeps += what == TAL_IMPLICIT_CORRECT;
+  for (size_t t = 0; t < s->system->tiles; t++)
+    largest = s->system->tile[t].change > largest ? s->system->tile[t].change : largest;
   return largest;
 }
 
+// Passes that are to come.
+typedef struct queue {
+  tal_implicit_pass pass[AT_ONCE];
+  int count;
+} queue;
+
+static void flush(const tal_implicit_solve *s, queue *q) {
+  tal_implicit_passes(s, q->pass, q->count, 1);
+  q->count = 0;
+}
+
+static void put(const tal_implicit_solve *s, queue *q, tal_implicit_pass pass) {
+  if (q->count == AT_ONCE)
+    flush(s, q);
+  q->pass[q->count++] = pass;
+}
+
+// What a boundary imposes on the loop is met by forces of its own, found beside those of the contacts.
+static void couple(const tal_implicit_solve *s, queue *q, bool first) {
+  const tal_boundary *boundary = s->sim->boundary;
+  if (!boundary || !boundary->couple || !s->advances)
+    return;
+  flush(s, q);
+  boundary->couple(s->sim, s->kick, first);
+}
+
+static void sweep(const tal_implicit_solve *s, queue *q) {
+  put(s, q, TAL_IMPLICIT_CORRECT);
+  couple(s, q, false);
+  s->system->sweeps++;
+}
+
+static tal_implicit_works sweep_again(const tal_implicit_solve *s, queue *q) {
+  sweep(s, q);
+  if (s->advances)
+    put(s, q, TAL_IMPLICIT_WORK);
+  flush(s, q);
+  return work(s);
+}
+
 // With all friction taken down to the share x its work is x A + x^2 B, B > 0: nil at x = -A/B.
-static tal_implicit_works take_down(const tal_implicit_solve *s, double all) {
+static tal_implicit_works take_down(const tal_implicit_solve *s, queue *q, double all) {
+  static const tal_implicit_pass off[] = {TAL_IMPLICIT_PRESS, TAL_IMPLICIT_WORK};
   tal_implicit *m = s->system;
-  sweep(s, TAL_IMPLICIT_PRESS, -1);
+  tal_implicit_passes(s, off, 2, -1);
   double linear = work(s).friction, share = linear < 0 ? linear / (linear - all) : 0;
   for (size_t lane = 0; lane < m->lanes; lane++)
     m->lane.ft[lane] *= share;
-  sweep(s, TAL_IMPLICIT_PRESS, 1);
-  couple(s, false);
+  put(s, q, TAL_IMPLICIT_PRESS);
+  couple(s, q, false);
+  put(s, q, TAL_IMPLICIT_WORK);
+  flush(s, q);
   return work(s);
 }
 
 // Sweeps; the work of a step.
 static tal_implicit_works settle(const tal_implicit_solve *s, const tal_scene_integrator *plan) {
-  int64_t sweeps = s->advances ? plan->sweeps : MORE_SWEEPS;
-  double change = 0;
-  sweep(s, TAL_IMPLICIT_BEGIN, 0);
-  couple(s, true);
-  for (int64_t k = 0; k < sweeps; k++) {
-    change = sweep(s, TAL_IMPLICIT_CORRECT, 0);
-    couple(s, false);
-  }
-  for (int k = 0; k < MOST_SWEEPS && change > plan->tolerance; k++) {
-    change = sweep(s, TAL_IMPLICIT_CORRECT, 0);
-    couple(s, false);
-  }
+  const int64_t sweeps = s->advances ? plan->sweeps : MORE_SWEEPS;
+  queue q = {.count = 0};
+  put(s, &q, TAL_IMPLICIT_SET);
+  put(s, &q, TAL_IMPLICIT_BEGIN);
+  couple(s, &q, true);
+  for (int64_t k = 0; k < sweeps; k++)
+    sweep(s, &q);
+  if (s->advances)
+    put(s, &q, TAL_IMPLICIT_WORK);
+  flush(s, &q);
+  for (int k = 0; k < MOST_SWEEPS && largest_change(s) > plan->tolerance; k++)
+    sweep_again(s, &q);
   if (!s->advances)
     return (tal_implicit_works){0, 0};
   tal_implicit_works done = work(s);
   if (!(s->effects & TAL_EFFECT_REGULARISED))
     return done;
-  for (int k = 0; done.friction > 0 && k < MORE_SWEEPS; k++) {
-    sweep(s, TAL_IMPLICIT_CORRECT, 0);
-    couple(s, false);
-    done = work(s);
-  }
-  return done.friction > 0 ? take_down(s, done.friction) : done;
+  for (int k = 0; done.friction > 0 && k < MORE_SWEEPS; k++)
+    done = sweep_again(s, &q);
+  return done.friction > 0 ? take_down(s, &q, done.friction) : done;
 }
 
 // ---- answers --------------------------------------------------------------------------------------------------------
@@ -185,19 +164,6 @@ static void answer_walls(const tal_implicit_solve *s) {
   }
 }
 
-// What the next step starts from.
-static void keep(const tal_implicit_solve *s) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-  const bool springs = s->effects & TAL_EFFECT_SPRING;
-#pragma omp simd
-  for (size_t lane = 0; lane < s->system->lanes; lane++) {
-    bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
-    m->kept_viscous[lane] = m->fn[lane] - m->elastic[lane];
-    m->kept_spring[lane] = springs && !slides ? m->spring[lane] : m->ft[lane];
-    m->kept_stiffness[lane] = m->spring_stiffness[lane];
-  }
-}
-
 static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
   if (sim->implicit.listed != sim->neighbours.rebuilds)
     tal_implicit_list(sim);
@@ -210,12 +176,9 @@ static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
                           .effects = sim->effects,
                           .advances = advances};
   const tal_scene_stage *stage = tal_sim_stage(sim);
-  set_grains(&s);
   set_walls(&s);
   tal_implicit_works done = settle(&s, stage ? &stage->integrator : &sim->scene->integrator);
   answer_walls(&s);
-  if (advances)
-    keep(&s);
   sim->forces_kept = false;
   return done;
 }
@@ -268,6 +231,7 @@ void tal_implicit_step(tal_sim *sim, double credit) {
     sim->run.correcting_work += credit * sim->run.correcting_power;
   }
   if (sim->implicit.all_free) {
+    tal_forces_forget(sim);
     take_velocities(sim, credit);
     book(sim, done, credit);
     return;

@@ -1,9 +1,11 @@
 // Friction and normal damping of all contacts solved together at velocity level (scheme implicit_friction), eqs
 // (50)-(56): each contact's forces are the law's answer to the velocities that the kick of all forces leaves behind,
 // found by sweeps over the contacts that correct both bodies at once (Gauss-Seidel), from the forces of the last step
-// on. Contacts are taken colour by colour; contacts of one colour share no grain, so the order within a colour and the
-// number of threads do not matter. Equal and opposite impulses with the arms r - d/2 keep momentum and angular
-// momentum.
+// on. Grains are cut into tiles that lie in memory one after the other; a contact belongs to the tile of its i and
+// reaches no further than the next tile. A sweep takes the even tiles, then the odd ones, each colour by colour;
+// contacts of one colour share no grain. Even tiles do not meet each other, nor do odd ones, so the number of threads
+// does not matter, and tiles may go through all passes of a step while they are in the cache (implicit_passes.c). Equal
+// and opposite impulses with the arms r - d/2 keep momentum and angular momentum.
 #ifndef TAL_IMPLICIT_H
 #define TAL_IMPLICIT_H
 
@@ -13,8 +15,8 @@
 
 struct tal_sim;
 
-// One lane per listed slot, wall slots too, in the order of the sweeps; every colour is filled up to whole vectors with
-// lanes that push nobody. X(name, unit, meaning)
+// One lane per listed slot, wall slots too, tile by tile, colour by colour; every colour is filled up to whole vectors
+// with lanes that push nobody. X(name, unit, meaning)
 #define TAL_LANE_FIELDS(X)                                                                                             \
   X(stiffness, "N/m^1.5 | N/m", "slot's")                                                                              \
   X(damping, "N s/m^1.5 | N s/m", "slot's")                                                                            \
@@ -52,7 +54,7 @@ typedef struct tal_implicit_body {
 
 // Where all that lies. Loops take a copy of this, so that what they store cannot be taken for one of these pointers.
 typedef struct tal_implicit_lanes {
-  tal_implicit_body *body;                   // owned; [body_capacity] grains, wall slots, two that nobody moves
+  tal_implicit_body *body;                   // owned; [body_capacity] grains, wall slots, two of each tile at rest
   int32_t *i, *j;                            // owned; [capacity] bodies
   int32_t *slot;                             // owned; [capacity] in sim->pairs; ~ of it in sim->wall_contacts
   bool *filler;                              // owned; [capacity] lanes that only fill a vector
@@ -66,18 +68,27 @@ typedef struct tal_implicit_works {
   double friction, damping;
 } tal_implicit_works;
 
+// Grains that lie together, and the contacts of which one of them is the i.
+typedef struct tal_implicit_tile {
+  size_t colour, colours;  // in `first`
+  bool serial_last;        // its last colour holds what found no free one, a vector each
+  int passes;              // done of those under way
+  double change;           // largest change of a friction force over its cap in the last sweep
+  tal_implicit_works work; // over the kick
+} tal_implicit_tile;
+
 typedef struct tal_implicit {
   tal_implicit_lanes lane;
   size_t lanes, capacity, body_capacity;
   size_t *wall_lane; // owned; [wall_lanes] lanes of the wall slots
   size_t wall_lanes;
-  tal_implicit_works *partial; // owned; [capacity / TAL_IMPLICIT_VECTOR + 1] what each block returned
-  bool all_free;               // no grain is fixed and no spin held
-  size_t colour_count;
-  size_t first[66]; // first lane of each colour
-  bool serial_last; // the last colour holds what found no free one, a vector each: swept in order by one thread
-  uint64_t listed;  // neighbour list these lanes were made from
-  int64_t sweeps;   // since the start, for reports
+  bool all_free; // no grain is fixed and no spin held
+  size_t tiles, tile_grains;
+  tal_implicit_tile *tile; // owned; [tiles]
+  size_t *first;           // owned; [colours + 1] first lane of each colour of each tile
+  bool serial_last;        // in some tile
+  uint64_t listed;         // neighbour list these lanes were made from
+  int64_t sweeps;          // since the start, for reports
 } tal_implicit;
 
 // Lanes of a vector.

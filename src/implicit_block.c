@@ -228,6 +228,18 @@ TAL_KERNEL double press_block(const tal_implicit_solve *s, size_t start, int cou
   return 0;
 }
 
+// What the next step starts from.
+TAL_KERNEL void keep(const tal_implicit_solve *s, const tal_implicit_lanes *m, size_t start, int count) {
+  const bool springs = s->effects & TAL_EFFECT_SPRING;
+#pragma omp simd
+  for (size_t lane = start; lane < start + (size_t)count; lane++) {
+    bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
+    m->kept_viscous[lane] = m->fn[lane] - m->elastic[lane];
+    m->kept_spring[lane] = springs && !slides ? m->spring[lane] : m->ft[lane];
+    m->kept_stiffness[lane] = m->spring_stiffness[lane];
+  }
+}
+
 tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, int count) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
@@ -239,6 +251,7 @@ tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, 
     friction[k] = m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
     damping[k] = (m->elastic[lane] - m->fn[lane]) * (m->approach[lane] + approach_of(&b, m, lane, k));
   }
+  keep(s, m, start, count);
   tal_implicit_works sum = {0, 0};
   for (int k = 0; k < count; k++) {
     sum.friction += friction[k];

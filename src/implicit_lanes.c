@@ -1,6 +1,7 @@
-// The order of the sweeps, made once per neighbour list: greedy colouring of the slots in their order, each takes the
-// first of 64 colours that neither of its grains has. Walls hold no colours: no contact changes their velocity. The
-// neighbour list is part of a run's state, so the order is the same after a stop.
+// The order of the sweeps, made once per neighbour list: tiles of grains that lie together, and greedy colouring of the
+// slots of a tile in their order, each takes the first of 64 colours that neither of its grains has. Walls hold no
+// colours: no contact changes their velocity. The neighbour list is part of a run's state, so the order is the same
+// after a stop.
 #include "implicit.h"
 
 #include "sim.h"
@@ -9,38 +10,40 @@
 #include <string.h>
 
 enum { COLOURS = 64 };
+// Grains of a tile, at least: a few tiles fit into the L2 cache. Smaller samples than TILES_FROM are one tile: they
+// gain nothing, and one sweep over even and odd tiles leaves some per cent more unbalanced than one over the whole.
+enum { TILE = 256, TILES_FROM = 8000 };
 
 void tal_implicit_init(tal_implicit *system) {
   *system = (tal_implicit){0};
 }
 
-static void free_all(tal_implicit *system) {
+static void free_lanes(tal_implicit *system) {
   tal_implicit_lanes *m = &system->lane;
   free(m->body);
   free(m->i);
   free(m->j);
   free(m->slot);
   free(m->filler);
-  free(system->partial);
-  free(system->wall_lane);
 #define X(name, unit, meaning) free(m->name);
   TAL_LANE_FIELDS(X)
 #undef X
 }
 
 void tal_implicit_clear(tal_implicit *system) {
-  free_all(system);
+  free_lanes(system);
+  free(system->wall_lane);
+  free(system->tile);
+  free(system->first);
   tal_implicit_init(system);
 }
 
 static void reserve(tal_implicit *s, size_t bodies, size_t lanes) {
   if (bodies <= s->body_capacity && lanes <= s->capacity)
     return;
-  free_all(s);
+  free_lanes(s);
   s->body_capacity = bodies + bodies / 16;
   s->capacity = lanes + lanes / 16;
-  s->wall_lane = NULL;
-  s->partial = tal_alloc(s->capacity / TAL_IMPLICIT_VECTOR + 1, sizeof *s->partial);
   tal_implicit_lanes *m = &s->lane;
   m->body = tal_alloc(s->body_capacity, sizeof *m->body);
   m->i = tal_alloc(s->capacity, sizeof *m->i);
@@ -78,20 +81,60 @@ size_t tal_implicit_colours(const int32_t *i, const int32_t *j, size_t count, si
   return colours;
 }
 
-// Lanes for each colour: whole vectors, and one vector per contact in the serial one. Returns their sum.
-static size_t lay_out(tal_implicit *s, const uint8_t *colour, size_t count) {
+// Slots of a tile: [pair, pair_end) and, of the walls, [wall, wall_end).
+typedef struct share {
+  size_t pair, pair_end, wall, wall_end;
+} share;
+
+// First slot whose i is not below the grain.
+static size_t slot_from(const tal_contacts *slots, size_t from, size_t grain) {
+  while (from < slots->count && (size_t)slots->i[from] < grain)
+    from++;
+  return from;
+}
+
+// The share that follows the one before.
+static share next_share(const tal_sim *sim, share before, size_t t) {
+  const size_t end = (t + 1) * sim->implicit.tile_grains;
+  return (share){before.pair_end, slot_from(&sim->pairs, before.pair_end, end), before.wall_end,
+                 slot_from(&sim->wall_contacts, before.wall_end, end)};
+}
+
+// Lanes for each colour of a tile, from lane `lanes` on: whole vectors, and one vector per contact in the serial one.
+// Returns the lane after the last.
+static size_t lay_out(tal_implicit *s, const tal_implicit_tile *tile, const uint8_t *colour, size_t count,
+                      size_t lanes) {
   size_t size[COLOURS + 1] = {0};
   for (size_t k = 0; k < count; k++)
     size[colour[k]]++;
-  size_t lanes = 0;
-  for (size_t c = 0; c < s->colour_count; c++) {
-    s->first[c] = lanes;
-    bool serial = s->serial_last && c == COLOURS;
-    lanes += serial ? size[c] * TAL_IMPLICIT_VECTOR
-                    : (size[c] + TAL_IMPLICIT_VECTOR - 1) / TAL_IMPLICIT_VECTOR * TAL_IMPLICIT_VECTOR;
+  for (size_t c = 0; c < tile->colours; c++) {
+    s->first[tile->colour + c] = lanes;
+    lanes += tile->serial_last && c == COLOURS
+                 ? size[c] * TAL_IMPLICIT_VECTOR
+                 : (size[c] + TAL_IMPLICIT_VECTOR - 1) / TAL_IMPLICIT_VECTOR * TAL_IMPLICIT_VECTOR;
   }
-  s->first[s->colour_count] = lanes;
+  s->first[tile->colour + tile->colours] = lanes;
   return lanes;
+}
+
+// Colours of the slots of tile t, whose grains and those they meet are numbered from its first.
+static void colour_tile(tal_sim *sim, size_t t, share part, uint8_t *colour) {
+  tal_implicit_tile *tile = &sim->implicit.tile[t];
+  const size_t pairs = part.pair_end - part.pair, walls = part.wall_end - part.wall, count = pairs + walls;
+  const size_t base = t * sim->implicit.tile_grains, left = sim->grains.count - base;
+  const size_t window = left < 2 * sim->implicit.tile_grains ? left : 2 * sim->implicit.tile_grains;
+  int32_t *i = tal_alloc(count, sizeof *i), *j = tal_alloc(count, sizeof *j);
+  for (size_t k = 0; k < pairs; k++) {
+    i[k] = sim->pairs.i[part.pair + k] - (int32_t)base;
+    j[k] = sim->pairs.j[part.pair + k] - (int32_t)base;
+  }
+  for (size_t k = 0; k < walls; k++) {
+    i[pairs + k] = sim->wall_contacts.i[part.wall + k] - (int32_t)base;
+    j[pairs + k] = (int32_t)(window + k);
+  }
+  tile->colours = tal_implicit_colours(i, j, count, window, colour, &tile->serial_last);
+  free(i);
+  free(j);
 }
 
 static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t lane, int32_t slot) {
@@ -107,7 +150,7 @@ static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t la
   s->filler[lane] = false;
   s->stiffness[lane] = slots->stiffness[c];
   s->damping[lane] = slots->damping[c];
-  s->friction[lane] = slots->friction[c];
+  s->friction[lane] = wall ? slots->friction[c] : sim->friction;
   s->radius_i[lane] = g->r[i];
   s->reach[lane] = g->r[i] + (wall ? 0 : g->r[j]);
   s->share_i[lane] = wall ? 1 : 0.5;
@@ -131,40 +174,66 @@ static void fill_rest(const tal_implicit_lanes *s, size_t lane, int32_t nobody) 
 #undef X
 }
 
+// Cuts the grains into tiles that no contact reaches across, and colours each; colours of pairs, then walls, tile by
+// tile. Returns the number of lanes.
+static size_t cut(tal_sim *sim, uint8_t *colour) {
+  tal_implicit *s = &sim->implicit;
+  const size_t grains = sim->grains.count, span = sim->neighbours.span;
+  s->tile_grains = grains < TILES_FROM ? grains : span > TILE ? span : TILE;
+  s->tiles = (grains + s->tile_grains - 1) / s->tile_grains;
+  free(s->tile);
+  free(s->first);
+  s->tile = tal_alloc(s->tiles, sizeof *s->tile);
+  s->first = tal_alloc(s->tiles * (COLOURS + 1) + 1, sizeof *s->first);
+  s->serial_last = false;
+  share part = {0};
+  size_t lanes = 0, colours = 0;
+  for (size_t t = 0; t < s->tiles; t++) {
+    part = next_share(sim, part, t);
+    uint8_t *own = colour + part.pair + part.wall;
+    colour_tile(sim, t, part, own);
+    s->tile[t].colour = colours;
+    colours += s->tile[t].colours;
+    s->serial_last = s->serial_last || s->tile[t].serial_last;
+    lanes = lay_out(s, &s->tile[t], own, part.pair_end - part.pair + part.wall_end - part.wall, lanes);
+  }
+  return lanes;
+}
+
+static void fill_tile(tal_sim *sim, size_t t, share part, const uint8_t *colour) {
+  tal_implicit *s = &sim->implicit;
+  const tal_implicit_tile *tile = &s->tile[t];
+  const size_t *first = s->first + tile->colour, pairs = part.pair_end - part.pair;
+  const size_t nobody = sim->grains.count + sim->wall_contacts.count + 2 * t;
+  size_t next[COLOURS + 1];
+  memcpy(next, first, tile->colours * sizeof *next);
+  s->lane.body[nobody] = (tal_implicit_body){.place = {1, 0, 0, 0}}; // a unit apart
+  s->lane.body[nobody + 1] = (tal_implicit_body){.place = {0, 0, 0, 0}};
+  for (size_t lane = first[0]; lane < first[tile->colours]; lane++)
+    fill_rest(&s->lane, lane, (int32_t)nobody);
+  for (size_t k = 0; k < pairs + part.wall_end - part.wall; k++) {
+    const size_t lane = next[colour[k]], wall = part.wall + k - pairs;
+    next[colour[k]] += colour[k] == COLOURS ? TAL_IMPLICIT_VECTOR : 1;
+    fill_lane(sim, &s->lane, lane, k < pairs ? (int32_t)(part.pair + k) : ~(int32_t)wall);
+    if (k >= pairs)
+      s->wall_lane[wall] = lane;
+  }
+}
+
 void tal_implicit_list(tal_sim *sim) {
   tal_implicit *s = &sim->implicit;
-  const size_t grains = sim->grains.count, pairs = sim->pairs.count, walls = sim->wall_contacts.count;
-  const size_t count = pairs + walls;
-  const int32_t nobody = (int32_t)(grains + walls);
-  int32_t *i = tal_alloc(count, sizeof *i), *j = tal_alloc(count, sizeof *j);
-  uint8_t *colour = tal_alloc(count, sizeof *colour);
-  memcpy(i, sim->pairs.i, pairs * sizeof *i);
-  memcpy(j, sim->pairs.j, pairs * sizeof *j);
-  for (size_t c = 0; c < walls; c++) {
-    i[pairs + c] = sim->wall_contacts.i[c];
-    j[pairs + c] = (int32_t)(grains + c);
-  }
-  s->colour_count = tal_implicit_colours(i, j, count, grains, colour, &s->serial_last);
-  size_t lanes = lay_out(s, colour, count), next[COLOURS + 1];
-  reserve(s, grains + walls + 2, lanes);
-  memcpy(next, s->first, sizeof next);
-  s->lanes = lanes;
+  const size_t grains = sim->grains.count, walls = sim->wall_contacts.count;
+  uint8_t *colour = tal_alloc(sim->pairs.count + walls, sizeof *colour);
+  s->lanes = cut(sim, colour);
+  reserve(s, grains + walls + 2 * s->tiles, s->lanes);
   free(s->wall_lane);
   s->wall_lanes = walls;
   s->wall_lane = tal_alloc(walls, sizeof *s->wall_lane);
-  s->lane.body[nobody].place = (tal_lanes){1, 0, 0, 0}; // a unit apart
-  s->lane.body[nobody + 1].place = (tal_lanes){0, 0, 0, 0};
-  for (size_t k = 0; k < lanes; k++)
-    fill_rest(&s->lane, k, nobody);
-  for (size_t k = 0; k < count; k++) {
-    size_t lane = next[colour[k]];
-    next[colour[k]] += colour[k] == COLOURS ? TAL_IMPLICIT_VECTOR : 1;
-    fill_lane(sim, &s->lane, lane, k < pairs ? (int32_t)k : ~(int32_t)(k - pairs));
-    if (k >= pairs)
-      s->wall_lane[k - pairs] = lane;
+  share part = {0};
+  for (size_t t = 0; t < s->tiles; t++) {
+    part = next_share(sim, part, t);
+    fill_tile(sim, t, part, colour + part.pair + part.wall);
   }
-  free(i);
-  free(j);
   free(colour);
   s->all_free = true;
   for (size_t g = 0; g < grains; g++)

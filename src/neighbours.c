@@ -45,8 +45,6 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   slots->stiffness[c] =
       sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
   slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
-  slots->friction[c] = sim->friction;
-  slots->spring[c] = slots->spring_stiffness[c] = slots->viscous[c] = 0;
 }
 
 static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t w) {
@@ -66,6 +64,8 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
 // Both lists ascend by (i, j): one merge carries the histories over.
 static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
   size_t o = 0;
+  if (!old->spring)
+    return;
   for (size_t c = 0; c < slots->count; c++) {
     while (o < old->count && (old->i[o] < slots->i[c] || (old->i[o] == slots->i[c] && old->j[o] < slots->j[c])))
       o++;
@@ -99,14 +99,16 @@ static void list_pairs(tal_sim *sim) {
   geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
-  tal_contacts_reserve(&fresh, pairs->count + pairs->count / 16 + 64);
+  const bool past = sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT);
+  tal_contacts_reserve_pairs(&fresh, pairs->count + pairs->count / 16 + 64, past);
   fresh.count = pairs->count;
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
-  if (sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT))
+  if (past)
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
+  geo_pairs_clear(pairs);
   measure_ring(sim);
 }
 
@@ -164,17 +166,21 @@ static void list_walls(tal_sim *sim) {
   tal_contacts_clear(&fresh);
 }
 
+void tal_neighbours_forget(tal_neighbours *neighbours) {
+  free(neighbours->first);
+  free(neighbours->slot);
+  neighbours->first = neighbours->slot = NULL;
+}
+
 // Deals the slots out to their grains: counts, then fills in slot order.
-static void list_incidences(tal_sim *sim) {
+void tal_neighbours_deal(tal_sim *sim) {
   tal_neighbours *n = &sim->neighbours;
   const tal_contacts *slots = &sim->pairs;
   size_t count = sim->grains.count;
-  if (n->slot_capacity < 2 * slots->count) {
-    free(n->slot);
-    n->slot_capacity = 2 * slots->capacity;
-    n->slot = tal_alloc(n->slot_capacity, sizeof *n->slot);
-  }
-  memset(n->first, 0, (count + 1) * sizeof *n->first);
+  if (n->first)
+    return;
+  n->first = tal_alloc(count + 1, sizeof *n->first);
+  n->slot = tal_alloc(2 * slots->count, sizeof *n->slot);
   for (size_t c = 0; c < slots->count; c++) {
     n->first[slots->i[c] + 1]++;
     n->first[slots->j[c] + 1]++;
@@ -193,10 +199,8 @@ static void list_incidences(tal_sim *sim) {
 static void list_all(tal_sim *sim) {
   tal_neighbours *n = &sim->neighbours;
   const tal_grains *g = &sim->grains;
-  if (n->grain_capacity != g->count || !n->first) {
-    free(n->first);
+  if (n->grain_capacity != g->count) {
     free(n->wall_first);
-    n->first = tal_alloc(g->count + 1, sizeof *n->first);
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
     free(sim->grain_records);
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
@@ -205,7 +209,7 @@ static void list_all(tal_sim *sim) {
   tal_implicit_save(sim);
   list_pairs(sim);
   list_walls(sim);
-  list_incidences(sim);
+  tal_neighbours_forget(n);
   n->rebuilds++;
 }
 

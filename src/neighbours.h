@@ -1,4 +1,4 @@
-// The neighbour list: candidate slots within a skin, and for each grain its slots in the order of its partners' ids.
+// The neighbour list: candidate slots within a skin, and for each grain its slots in the order of its partners.
 #ifndef TAL_NEIGHBOURS_H
 #define TAL_NEIGHBOURS_H
 
@@ -9,10 +9,10 @@ struct tal_sim;
 
 typedef struct tal_neighbours {
   geo_pairs pairs;     // scratch of the bucket grid
-  int32_t *first;      // owned; [n + 1] start of each grain's incidences
+  int32_t *first;      // owned; [n + 1] start of each grain's incidences; NULL where nobody looked
   int32_t *slot;       // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
   int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
-  size_t grain_capacity, slot_capacity;
+  size_t grain_capacity;
   size_t span;  // largest j - i of the slots
   size_t ring;  // grains whose sums the hot loop must hold at a time, a power of two
   double moved; // [m] no grain has moved further than this since the list was built
@@ -24,6 +24,9 @@ void tal_neighbours_init(tal_neighbours *neighbours);
 void tal_neighbours_clear(tal_neighbours *neighbours);
 // Rebuilds the list of `sim` from the present centres; spring histories are carried over by (i, j).
 void tal_neighbours_rebuild(struct tal_sim *sim);
+// Each grain's incidences: made where this list has none yet, and thrown away.
+void tal_neighbours_deal(struct tal_sim *sim);
+void tal_neighbours_forget(tal_neighbours *neighbours);
 // Makes the list of a restored run again: that of the centres it was last built from, so that the order of the contacts
 // and the moment of the next rebuild are those of the unbroken run.
 void tal_neighbours_restore(struct tal_sim *sim);

@@ -2,6 +2,7 @@
 // time, each written whole: a run killed at any moment leaves every frame readable.
 #include "output_parts.h"
 
+#include "order.h"
 #include "store.h"
 #include <dirent.h>
 #include <errno.h>
@@ -176,8 +177,11 @@ static void put_loop(tal_store *store, const tal_graph *graph) {
 }
 
 static tal_status write_frame(const char *path, tal_sim *sim, size_t *cells, tal_error *err) {
-  tal_observed seen = tal_sim_driving(sim);
+  const tal_observed now = tal_sim_driving(sim);
+  tal_by_id copy;
   tal_store store;
+  tal_by_id_init(&copy, &now);
+  const tal_observed seen = copy.seen;
   tal_store_begin(&store);
   tal_store_put_number(&store, "time", sim->run.time);
   tal_store_put_integer(&store, "step", sim->run.step);
@@ -191,6 +195,7 @@ static tal_status write_frame(const char *path, tal_sim *sim, size_t *cells, tal
     put_membrane(&store, &sim->membrane);
   *cells = put_cells(&store, &seen);
   put_loop(&store, seen.graph);
+  tal_by_id_clear(&copy);
   return tal_store_save(&store, path, NULL, err);
 }
 

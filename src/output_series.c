@@ -2,6 +2,7 @@
 // does not fit is cut off again, so that the file never ends in a torn line.
 #include "output_parts.h"
 
+#include "order.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <math.h>
@@ -176,9 +177,9 @@ tal_status tal_output_tracks(tal_output *output, const tal_sim *sim, tal_error *
   char *text = NULL;
   size_t size = 0;
   FILE *stream = open_memstream(&text, &size);
-  // Ids are indices.
-  for (size_t k = 0; k < wanted->track_count; k++) {
-    put_track(stream, sim->run.time, &sim->grains, (size_t)wanted->tracks[k]);
-  }
+  int32_t *index = tal_order_of_ids(&sim->grains);
+  for (size_t k = 0; k < wanted->track_count; k++)
+    put_track(stream, sim->run.time, &sim->grains, (size_t)index[wanted->tracks[k]]);
+  free(index);
   return append_rows(&output->tracks, stream, &text, &size, sim->run.step, err);
 }

@@ -112,7 +112,6 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
 
 // Nothing that has gone bad is written.
 static tal_status inspect(job *this, tal_error *err) {
-  tal_forces_expand(this->sim);
   return tal_step_inspect(this->sim, err);
 }
 

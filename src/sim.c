@@ -9,6 +9,7 @@
 #include "forced.h"
 #include "forces.h"
 #include "integrate.h"
+#include "order.h"
 #include "stage.h"
 #include "step.h"
 
@@ -72,6 +73,7 @@ static tal_status make_grains(tal_sim *sim, tal_error *err) {
   sim->constants.mean_radius = mean(packing.r, packing.count);
   sim->constants.thickness = isnan(scene->grains.thickness) ? 2 * sim->constants.mean_radius : scene->grains.thickness;
   tal_packing_grains(&packing, scene, sim->constants.thickness, &sim->grains);
+  tal_order_grains(&sim->grains);
   sim->packing_solid_fraction = packing.solid_fraction;
   sim->packing_coordination = packing.coordination;
   sim->packing_overlap = packing.largest_overlap;
@@ -84,6 +86,7 @@ static void set_graph(tal_sim *sim) {
   tal_graph_init(&sim->graph);
   sim->graph.backend = geo_delaunay_backend_find(plan->backend);
   sim->graph.power = plan->power;
+  sim->graph.edges_on_demand = true;
   sim->graph.gap_limit = plan->peel * 2 * sim->constants.mean_radius;
 }
 
@@ -208,6 +211,7 @@ tal_observed tal_sim_driving(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   tal_forces_expand(sim);
   tal_forces_resultants(sim);
+  tal_graph_index_edges(&sim->graph);
   return (tal_observed){.grains = g,
                         .pairs = &sim->pairs,
                         .walls = &sim->wall_contacts,

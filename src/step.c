@@ -305,7 +305,6 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   sim->dt = sim->dt_next;
   run->force_evaluations++;
   if (run->step / INSPECT_EVERY != before / INSPECT_EVERY) {
-    tal_forces_expand(sim);
     if ((status = tal_step_inspect(sim, err)))
       return status;
     if ((status = check_step(sim, err)))

@@ -80,7 +80,9 @@ typedef struct bad_line {
 } bad_line;
 
 static const bad_line bad_lines[] = {
-    {{"fly"}, 2, "talus: fly: unknown command; accepted: run, check, impact, measure, plot, study, rotation, verify, keys"},
+    {{"fly"},
+     2,
+     "talus: fly: unknown command; accepted: run, check, impact, measure, plot, study, rotation, verify, keys"},
     {{"--fly"}, 2, "talus: --fly: unknown option"},
     {{"run"}, 2, "talus run: SCENE.yaml: is missing"},
     {{"check"}, 2, "talus check: SCENE.yaml: is missing"},

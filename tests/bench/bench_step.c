@@ -1,6 +1,7 @@
 // Grain-steps per second on one core in a confined assembly under compression, and the share of each phase of a step.
 // CPU time of the one thread, median of REPEATS; the assembly is a drop-and-roll packing whose radii are swollen until
-// its contacts carry the overlap of 100 kPa. Usage: bench_step [N ...] (default 4000 100000).
+// its contacts carry the overlap of 100 kPa. Usage: bench_step [-v NAME] [N ...]: the
+// variants whose name begins so (all), the sizes (4000 100000). bench_step -w FILE N: writes the assembly for LAMMPS.
 #include "effects.h"
 #include "forces.h"
 #include "integrate.h"
@@ -8,7 +9,9 @@
 #include "sim.h"
 #include "step.h"
 
+#include <malloc.h>
 #include <omp.h>
+#include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -26,12 +29,12 @@ typedef struct variant {
 } variant;
 
 static const variant variants[] = {
-    {"hertz, damping, regularised, rotation", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
+    {"regularised: hertz, damping, rotation", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
      "{dt: 1e-5}"},
-    {"hertz, damping, spring, rotation", "{normal: hertz, tangential: spring}", 0.45, "true", "{dt: 1e-5}"},
-    {"hertz, damping", "{normal: hertz, tangential: none}", 0, "true", "{dt: 1e-5}"},
+    {"spring: hertz, damping, rotation", "{normal: hertz, tangential: spring}", 0.45, "true", "{dt: 1e-5}"},
+    {"damping: hertz", "{normal: hertz, tangential: none}", 0, "true", "{dt: 1e-5}"},
     {"linear", "{normal: linear, tangential: none, stiffness: 5e5}", 0, "true", "{dt: 1e-5}"},
-    {"the first, implicit, one sweep", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
+    {"implicit: the first, one sweep", "{normal: hertz, tangential: regularised, exponent: 20}", 0.45, "true",
      "{scheme: implicit_friction, dt: 1e-4, sweeps: 1}"},
 };
 
@@ -113,45 +116,101 @@ static void refresh(tal_sim *sim) {
   tal_step_refresh(sim, NULL);
 }
 
+// Nanoseconds per grain and step of the limit that issue and documents measure against: a contiguous kernel.
+static const double limit = 12;
+
+// Bytes in use by this process.
+static double bytes_used(void) {
+  struct mallinfo2 now = mallinfo2();
+  return (double)now.uordblks + (double)now.hblkhd;
+}
+
+static size_t touching(tal_sim *sim) {
+  size_t count = 0;
+  tal_forces_expand(sim);
+  for (size_t c = 0; c < sim->pairs.count; c++)
+    count += sim->pairs.overlap[c] > 0;
+  return count;
+}
+
+// Shares of the phases of an explicit step.
+static void print_phases(tal_sim *sim, double step, double rebuilds, int count) {
+  double t_drift = phase(drift, sim, count), t_forces = phase(forces, sim, count),
+         t_list = phase(rebuild, sim, count / 10 + 1) * rebuilds, t_graph = phase(refresh, sim, count / 10 + 1) / 250;
+  double rest = step - t_drift - t_forces - t_list - t_graph;
+  printf("   %5.1f %6.1f %5.1f %5.1f %5.1f", 100 * t_drift / step, 100 * t_forces / step, 100 * t_list / step,
+         100 * t_graph / step, 100 * rest / step);
+}
+
 static void measure(const variant *v, int n) {
   tal_scene scene;
+  const double before = bytes_used();
   tal_sim *sim = create(v, n, &scene);
-  steps(sim, 300);
+  const int count = n < 4000 ? 2000 : (int)(8e6 / n) + 5;
+  steps(sim, count < 300 ? count : 300);
+  const double bytes = bytes_used() - before, grains = (double)sim->grains.count;
   uint64_t rebuilds = sim->neighbours.rebuilds;
-  int count = n > 20000 ? 250 : 2500;
-  double step = phase(one_step, sim, count);
-  double grains = (double)sim->grains.count, listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
-  if (sim->effects & TAL_EFFECT_IMPLICIT) { // other phases than those below
-    printf("%-40s %8d %7.1f   ns %.1f  slots/grain %.2f\n", v->name, n, 1e-6 * grains / step, 1e9 * step / grains,
-           (double)sim->pairs.count / grains);
-    fflush(stdout);
-    tal_sim_free(sim);
-    tal_scene_clear(&scene);
-    return;
-  }
-  int few = count / 10;
-  double t_drift = phase(drift, sim, few), t_forces = phase(forces, sim, few), t_list = phase(rebuild, sim, few / 10),
-         t_graph = phase(refresh, sim, few / 10) / 250;
-  double rest = step - t_drift - t_forces - t_list * listed - t_graph;
-  printf("%-40s %8d %7.1f   drift %4.1f  forces+kick %4.1f  list %4.1f  graph %4.1f  rest %4.1f   ns %.1f  slots/grain "
-         "%.2f\n",
-         v->name, n, 1e-6 * grains / step, 100 * t_drift / step, 100 * t_forces / step, 100 * t_list * listed / step,
-         100 * t_graph / step, 100 * rest / step, 1e9 * step / grains, (double)sim->pairs.count / grains);
+  double step = phase(one_step, sim, count), ns = 1e9 * step / grains;
+  double listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
+  printf("%-38s %8d %7.1f %7.1f %7.1f %6.2f %6.2f %6.0f", v->name, n, 1e3 / ns, ns, 1e9 * step / (double)touching(sim),
+         ns / limit, (double)sim->pairs.count / grains, bytes / grains);
+  if (!(sim->effects & TAL_EFFECT_IMPLICIT)) // whose phases are others
+    print_phases(sim, step, listed, count / 10 + 1);
+  printf("\n");
   fflush(stdout);
   tal_sim_free(sim);
   tal_scene_clear(&scene);
 }
 
-int main(int argc, char **argv) {
-  omp_set_num_threads(1);
-  printf("%-40s %8s %7s   share of a step [%%]\n", "variant", "N", "M gs/s");
-  for (size_t v = 0; v < sizeof variants / sizeof *variants; v++) {
-    if (argc == 1) {
-      measure(&variants[v], 4000);
-      measure(&variants[v], 100000);
-    }
-    for (int k = 1; k < argc; k++)
-      measure(&variants[v], atoi(argv[k]));
+// The assembly of the spring law as a data file of LAMMPS, for peers.sh.
+static int write_data(const char *path, int n) {
+  tal_scene scene;
+  tal_sim *sim = create(&variants[1], n, &scene);
+  steps(sim, 300);
+  const tal_grains *g = &sim->grains;
+  double low[2] = {(double)INFINITY, (double)INFINITY}, high[2] = {-(double)INFINITY, -(double)INFINITY};
+  for (size_t i = 0; i < g->count; i++) {
+    low[0] = fmin(low[0], g->x[i] - g->r[i]);
+    high[0] = fmax(high[0], g->x[i] + g->r[i]);
+    low[1] = fmin(low[1], g->y[i] - g->r[i]);
+    high[1] = fmax(high[1], g->y[i] + g->r[i]);
   }
+  FILE *to = fopen(path, "w");
+  if (!to)
+    return 1;
+  fprintf(to, "confined assembly\n\n%zu atoms\n1 atom types\n%.9g %.9g xlo xhi\n%.9g %.9g ylo yhi\n", g->count, low[0],
+          high[0], low[1], high[1]);
+  fprintf(to, "-1e-3 1e-3 zlo zhi\n\nAtoms # sphere\n\n");
+  for (size_t i = 0; i < g->count; i++)
+    fprintf(to, "%zu 1 %.17g 1 %.17g %.17g 0\n", i + 1, 2 * g->r[i], g->x[i], g->y[i]);
+  tal_sim_free(sim);
+  tal_scene_clear(&scene);
+  return fclose(to) != 0;
+}
+
+// The variants whose name begins with `wanted`.
+static void measure_all(const char *wanted, int n) {
+  for (size_t v = 0; v < sizeof variants / sizeof *variants; v++)
+    if (strncmp(variants[v].name, wanted, strlen(wanted)) == 0)
+      measure(&variants[v], n);
+}
+
+int main(int argc, char **argv) {
+  if (argc == 4 && strcmp(argv[1], "-w") == 0)
+    return write_data(argv[2], atoi(argv[3]));
+  const bool chosen = argc > 2 && strcmp(argv[1], "-v") == 0;
+  const char *wanted = chosen ? argv[2] : "";
+  const int first = chosen ? 3 : 1;
+  omp_set_num_threads(1);
+  printf("%-38s %8s %7s %7s %7s %6s %6s %6s   share of a step [%%]\n", "variant", "N", "M gs/s", "ns per", "ns per",
+         "over", "slots", "bytes");
+  printf("%-38s %8s %7s %7s %7s %6s %6s %6s   drift forces  list graph  rest\n", "", "", "", "grain", "contact",
+         "limit", "/grain", "/grain");
+  if (first == argc) {
+    measure_all(wanted, 4000);
+    measure_all(wanted, 100000);
+  }
+  for (int k = first; k < argc; k++)
+    measure_all(wanted, atoi(argv[k]));
   return 0;
 }

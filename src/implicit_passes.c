@@ -1,0 +1,132 @@
+// Passes over the tiles. In effect a pass goes over all even tiles, then over all odd ones, and the next pass begins
+// when it is done. Only neighbours meet: a pass on an even tile has to follow the pass before on both neighbours, on an
+// odd tile the same pass on them. So the passes follow each other through the sample at a distance of two tiles, and
+// what they work on is in the cache still. Threads take ranges of tiles and go as far as they can without their
+// neighbours' tiles; what is left about the ends of the ranges is done by one. No order but that of neighbours counts:
+// the same bits for any number of threads.
+#include "implicit_parts.h"
+
+#include "effects.h"
+
+#include <omp.h>
+
+enum { BLOCK = TAL_IMPLICIT_BLOCK };
+// A range of fewer tiles is all end.
+enum { TILES_PER_THREAD = 6 };
+
+// Passes under way on the tiles [begin, end).
+typedef struct work_list {
+  const tal_implicit_solve *solve;
+  const tal_implicit_pass *pass;
+  int count;
+  double factor;
+  ptrdiff_t begin, end;
+} work_list;
+
+// Velocities before the kick, and after it with the boundary's forces and gravity alone.
+static void set_grains(const tal_implicit_solve *s, size_t from, size_t to) {
+  const tal_grains *g = &s->sim->grains;
+  const double *gravity = s->sim->scene->gravity;
+  const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
+  tal_implicit_body *body = s->system->lane.body;
+  for (size_t i = from; i < to; i++) {
+    const double kick = g->inverse_mass[i] > 0 ? s->kick : 0;
+    double ax = gravity[0], ay = gravity[1], w = spin ? g->omega[i] : 0;
+    if (boundary) {
+      ax += g->bx[i] * g->inverse_mass[i];
+      ay += g->by[i] * g->inverse_mass[i];
+    }
+    body[i].place = (tal_lanes){g->x[i], g->y[i], 0, 0};
+    body[i].before = (tal_lanes){g->vx[i], g->vy[i], w, w};
+    body[i].now = body[i].before + (tal_lanes){kick * ax, kick * ay, 0, 0};
+  }
+}
+
+// One colour: the largest of what its blocks return.
+static double take_colour(const tal_implicit_solve *s, tal_implicit_pass what, size_t from, size_t to, size_t size,
+                          double factor) {
+  double largest = 0;
+  for (size_t start = from; start < to; start += size) {
+    double change = tal_implicit_take(s, what, start, (int)(to - start < size ? to - start : size), factor);
+    largest = change > largest ? change : largest;
+  }
+  return largest;
+}
+
+static void sweep_tile(const tal_implicit_solve *s, tal_implicit_pass what, tal_implicit_tile *tile, double factor) {
+  const size_t *first = s->system->first + tile->colour;
+  double largest = 0;
+  for (size_t c = 0; c < tile->colours; c++) {
+    const bool serial = tile->serial_last && c + 1 == tile->colours;
+    double change = take_colour(s, what, first[c], first[c + 1], serial ? TAL_IMPLICIT_VECTOR : BLOCK, factor);
+    largest = change > largest ? change : largest;
+  }
+  if (what == TAL_IMPLICIT_CORRECT)
+    tile->change = largest;
+}
+
+static void work_tile(const tal_implicit_solve *s, tal_implicit_tile *tile) {
+  const size_t *first = s->system->first + tile->colour, end = first[tile->colours];
+  tile->work = (tal_implicit_works){0, 0};
+  for (size_t start = first[0]; start < end; start += BLOCK) {
+    tal_implicit_works part = tal_implicit_work(s, start, (int)(end - start < BLOCK ? end - start : BLOCK));
+    tile->work.friction += part.friction;
+    tile->work.damping += part.damping;
+  }
+}
+
+static void pass_tile(const tal_implicit_solve *s, tal_implicit_pass what, size_t t, double factor) {
+  const size_t size = s->system->tile_grains, count = s->sim->grains.count, end = (t + 1) * size;
+  if (what == TAL_IMPLICIT_SET)
+    set_grains(s, t * size, end < count ? end : count);
+  else if (what == TAL_IMPLICIT_WORK)
+    work_tile(s, &s->system->tile[t]);
+  else
+    sweep_tile(s, what, &s->system->tile[t], factor);
+}
+
+// Has tile t done so many passes, as far as this range knows? Beyond the sample there is nothing to wait for.
+static bool has_done(const work_list *w, ptrdiff_t t, int passes) {
+  if (t < 0 || t >= (ptrdiff_t)w->solve->system->tiles)
+    return true;
+  return passes == 0 || (t >= w->begin && t < w->end && w->solve->system->tile[t].passes >= passes);
+}
+
+// Pass p on tile t where it is its turn.
+static void try_pass(const work_list *w, ptrdiff_t t, int p) {
+  const int needed = p + (t & 1);
+  if (t < w->begin || t >= w->end || w->solve->system->tile[t].passes != p)
+    return;
+  if (!has_done(w, t - 1, needed) || !has_done(w, t + 1, needed))
+    return;
+  pass_tile(w->solve, w->pass[p], (size_t)t, w->factor);
+  w->solve->system->tile[t].passes = p + 1;
+}
+
+static void go_through(const work_list *w) {
+  for (ptrdiff_t front = w->begin & ~(ptrdiff_t)1; front < w->end + 2 * w->count; front += 2)
+    for (int p = 0; p < w->count; p++) {
+      try_pass(w, front - 2 * p, p);
+      try_pass(w, front - 2 * p - 1, p);
+    }
+}
+
+void tal_implicit_passes(const tal_implicit_solve *s, const tal_implicit_pass *pass, int count, double factor) {
+  const ptrdiff_t tiles = (ptrdiff_t)s->system->tiles;
+  const ptrdiff_t useful = tiles / TILES_PER_THREAD, there = omp_get_max_threads();
+  const int threads = (int)(useful < 1 ? 1 : useful < there ? useful : there);
+  const work_list all = {s, pass, count, factor, 0, tiles};
+  for (ptrdiff_t t = 0; t < tiles; t++)
+    s->system->tile[t].passes = 0;
+  if (threads > 1) {
+#pragma omp parallel num_threads(threads)
+    {
+      const ptrdiff_t part = omp_get_thread_num(), parts = omp_get_num_threads();
+      work_list own = all;
+      own.begin = tiles * part / parts;
+      own.end = tiles * (part + 1) / parts;
+      go_through(&own);
+    }
+  }
+  go_through(&all);
+}
