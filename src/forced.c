@@ -128,6 +128,7 @@ tal_status tal_forced_draw(tal_sim *sim, const tal_scene_stage *plan, int64_t **
     if (g->inverse_mass[i] > 0 && touching[i] >= 2 && to_loop(sim, i) >= margin)
       fit[fits++] = g->id[i];
   free(touching);
+  qsort(fit, fits, sizeof *fit, ascending); // the draw knows nothing of the order in memory
   if (fits >= *count) {
     gsl_rng *random = tal_random_stream(sim->scene->seed, TAL_STREAM_FORCED);
     gsl_ran_choose(random, *ids, *count, fit, fits, sizeof *fit);
