@@ -208,11 +208,44 @@ tal_status tal_store_save(tal_store *store, const char *path, const char *previo
   return status;
 }
 
-static void open_image(tal_store *store, unsigned char *image, size_t size) {
+// HDF5 copies a file image three times unless these say that it may use the store's own, which outlives its file.
+static void *lend(size_t size, H5FD_file_image_op_t operation, void *image) {
+  (void)size;
+  (void)operation;
+  return image;
+}
+
+static void *copy_nothing(void *to, const void *from, size_t size, H5FD_file_image_op_t operation, void *image) {
+  (void)from;
+  (void)size;
+  (void)operation;
+  (void)image;
+  return to;
+}
+
+static herr_t keep(void *memory, H5FD_file_image_op_t operation, void *image) {
+  (void)memory;
+  (void)operation;
+  (void)image;
+  return 0;
+}
+
+static void *same(void *image) {
+  return image;
+}
+
+static herr_t leave(void *image) {
+  (void)image;
+  return 0;
+}
+
+static void open_image(tal_store *store, size_t size) {
   char name[32];
   memory_name(store, name);
   hid_t access = memory_access(store);
-  check(store, H5Pset_file_image(access, image, size), "taking", "the content");
+  H5FD_file_image_callbacks_t callbacks = {lend, copy_nothing, NULL, keep, same, leave, store->image};
+  check(store, H5Pset_file_image_callbacks(access, &callbacks), "lending", "the content");
+  check(store, H5Pset_file_image(access, store->image, size), "taking", "the content");
   store->file = H5Fopen(name, H5F_ACC_RDONLY, access);
   check(store, store->file, "it is no", "HDF5 file");
   H5Pclose(access);
@@ -221,17 +254,15 @@ static void open_image(tal_store *store, unsigned char *image, size_t size) {
 
 tal_status tal_store_open(tal_store *store, const char *path, tal_error *err) {
   start(store, path);
-  unsigned char *data;
   size_t size;
-  tal_status status = tal_file_read(path, &data, &size, err);
-  if (status == TAL_OK && !tal_seal_check(data, size)) {
+  tal_status status = tal_file_read(path, &store->image, &size, err);
+  if (status == TAL_OK && !tal_seal_check(store->image, size)) {
     status = tal_fail(err, TAL_BAD_INPUT, "%s is damaged: its content does not match its checksum", path);
   }
   if (status == TAL_OK) {
-    open_image(store, data, size - TAL_SEAL_SIZE);
+    open_image(store, size - TAL_SEAL_SIZE);
     status = tal_store_status(store, err);
   }
-  free(data);
   if (status != TAL_OK)
     tal_store_close(store);
   return status;
@@ -363,5 +394,7 @@ void tal_store_close(tal_store *store) {
   if (store->file >= 0)
     H5Fclose(store->file);
   store->group = store->file = H5I_INVALID_HID;
+  free(store->image);
+  store->image = NULL;
   loud(store);
 }

@@ -33,6 +33,7 @@ typedef struct tal_array {
 
 typedef struct tal_store {
   int64_t file, group;                        // HDF5 identifiers
+  unsigned char *image;                       // owned; the file that is read, which HDF5 works on in place
   char path[512];                             // for messages
   bool failed;                                //
   char what[200];                             // the first failure
