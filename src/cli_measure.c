@@ -5,6 +5,7 @@
 #include "measure.h"
 #include "scene_value.h"
 #include <math.h>
+#include <signal.h>
 #include <unistd.h>
 
 typedef struct showing {
@@ -22,6 +23,21 @@ static void print_path(void *user, const char *path) {
   const showing *show = user;
   if (!show->quiet)
     printf("%s\n", path);
+}
+
+// Ctrl-C and SIGTERM wait here until they are asked for: between frames, and after a figure. They end gnuplot, which
+// blocks nothing, at once.
+static void hold_signals(sigset_t *held) {
+  sigemptyset(held);
+  sigaddset(held, SIGINT);
+  sigaddset(held, SIGTERM);
+  sigprocmask(SIG_BLOCK, held, NULL);
+}
+
+static bool asked_to_stop(void *user) {
+  sigset_t waiting;
+  (void)user;
+  return sigpending(&waiting) == 0 && (sigismember(&waiting, SIGINT) || sigismember(&waiting, SIGTERM));
 }
 
 // One line naming the option; TAL_BAD_INPUT.
@@ -77,7 +93,9 @@ int tal_cli_measure(int argc, char **argv) {
                              "DIR", argc, argv, &exit_code))
     return exit_code;
   showing show = {.bar = !options.quiet && isatty(STDERR_FILENO), .quiet = options.quiet};
-  tal_measure_options what = {.progress = show_progress, .made = print_path, .user = &show};
+  tal_measure_options what = {.progress = show_progress, .made = print_path, .stop = asked_to_stop, .user = &show};
+  sigset_t held;
+  hold_signals(&held);
   exit_code = take_options(&what, &options);
   if (!exit_code)
     exit_code = measure(&options, &what, options.quiet);

@@ -1,4 +1,5 @@
-// Measuring a run from its stored fields: what `talus measure DIR` does. One pass over the frames, one frame in memory.
+// Measuring a run from its stored fields: what `talus measure DIR` does. One pass over the frames; while one is
+// measured the next is read.
 // The measurements themselves are functions of a part of a snapshot (measure_snapshot.h): measure_tensors.h,
 // measure_forces.h, measure_chains.h, measure_voids.h, measure_bands.h. Tables and figures: docs/formats.md.
 #ifndef TAL_MEASURE_H
@@ -26,6 +27,7 @@ typedef struct tal_measure_options {
   bool figures;
   void (*progress)(void *user, size_t done, size_t of); // NULL: none; after each frame
   void (*made)(void *user, const char *path);           // NULL: none; each file written
+  bool (*stop)(void *user);                             // NULL: never; asked after each frame
   void *user;
 } tal_measure_options;
 
@@ -34,7 +36,8 @@ typedef struct tal_measure_counts {
 } tal_measure_counts;
 
 // Writes tables and figures into the folder `out` (made when it is missing). TAL_BAD_INPUT when `dir` has no frames or
-// an option is wrong (nothing is written then) or a frame is damaged; TAL_IO.
+// an option is wrong (nothing is written then) or a frame is damaged; TAL_IO; TAL_INTERRUPTED, without tables when
+// frames were left.
 tal_status tal_measure(const char *dir, const char *out, const tal_measure_options *options, tal_measure_counts *counts,
                        tal_error *err);
 

@@ -54,8 +54,9 @@ static summary summarise(const tal_field *f) {
 static void strip_range(const tal_field *f, double angle, double range[2]) {
   range[0] = HUGE_VAL;
   range[1] = -HUGE_VAL;
+  const double c = cos(angle), d = sin(angle);
   for (size_t k = 0; k < f->count; k++) {
-    const double s = f->x[k] * cos(angle) + f->y[k] * sin(angle);
+    const double s = f->x[k] * c + f->y[k] * d;
     range[0] = fmin(range[0], s);
     range[1] = fmax(range[1], s);
   }
@@ -106,43 +107,69 @@ static void band_model(void *context, const double *p, double *value) {
   }
 }
 
-// For a profile and a Gauss curve of given place and width, base and height by linear least squares. Returns how much
-// of the squares they take away.
-static double fit_linear(const tal_profile *p, double place, double sigma, double parameter[PARAMETERS]) {
-  double n = 0, g1 = 0, g2 = 0, v1 = 0, gv = 0;
-  for (size_t b = 0; b < p->count; b++) {
-    const double w = (double)p->points[b], s = (p->s[b] - place) / sigma, g = exp(-s * s / 2);
-    n += w;
-    g1 += w * g;
-    g2 += w * g * g;
-    v1 += w * p->mean[b];
-    gv += w * g * p->mean[b];
+// Gauss curves of a set of widths at whole numbers of strips from their middle, cut off where they are nothing.
+enum { WIDTHS = 4, REACH = 8 };
+static const double sigmas[WIDTHS] = {1, 2, 4, 8};
+typedef struct curves {
+  double value[WIDTHS][TAL_PROFILE_MOST];
+  size_t reach[WIDTHS];
+} curves;
+
+static void lay_curves(curves *c, const tal_profile *p) {
+  for (size_t w = 0; w < WIDTHS; w++) {
+    c->reach[w] = 0;
+    for (size_t k = 0; k < p->count && (double)k * p->width <= REACH * sigmas[w]; k++) {
+      const double s = (double)k * p->width / sigmas[w];
+      c->value[w][k] = exp(-s * s / 2);
+      c->reach[w] = k;
+    }
+  }
+}
+
+// For a profile and the curve of one width in the middle of one strip, base and height by linear least squares; n and
+// v1 are the sums of the points and of their values. Returns how much of the squares they take away.
+static double fit_linear(const tal_profile *p, const curves *c, size_t middle, size_t width, double n, double v1,
+                         double parameter[PARAMETERS]) {
+  const size_t reach = c->reach[width], first = middle > reach ? middle - reach : 0,
+               last = middle + reach < p->count ? middle + reach : p->count - 1;
+  double g1 = 0, g2 = 0, gv = 0;
+  for (size_t b = first; b <= last; b++) {
+    const double g = c->value[width][b < middle ? middle - b : b - middle], wg = (double)p->points[b] * g;
+    g1 += wg;
+    g2 += wg * g;
+    gv += wg * p->mean[b];
   }
   const double spread = g2 - g1 * g1 / n, together = gv - g1 * v1 / n;
   parameter[HEIGHT] = spread > 1e-9 * n ? together / spread : 0;
   parameter[BASE] = (v1 - parameter[HEIGHT] * g1) / n;
-  parameter[PLACE] = place;
-  parameter[LOG_SIGMA] = log(sigma);
+  parameter[PLACE] = p->s[middle];
+  parameter[LOG_SIGMA] = log(sigmas[width]);
   return parameter[HEIGHT] > 0 ? together * parameter[HEIGHT] : 0;
 }
 
-// The best of all directions in steps of 4 degrees, places, and four widths.
+// The best of all directions in steps of 4 degrees, places, and widths.
 static void scan(const tal_field *scaled, double parameter[PARAMETERS]) {
-  static const double sigmas[] = {1, 2, 4, 8};
   double most = -1, one[PARAMETERS];
+  curves *c = tal_alloc(1, sizeof *c);
   for (int k = 0; k < 45; k++) {
-    const double angle = TAL_PI * k / 45;
-    const tal_profile p = tal_profile_across(scaled, angle, 1);
+    one[ANGLE] = TAL_PI * k / 45;
+    const tal_profile p = tal_profile_across(scaled, one[ANGLE], 1);
+    double n = 0, v1 = 0;
+    for (size_t b = 0; b < p.count; b++) {
+      n += (double)p.points[b];
+      v1 += (double)p.points[b] * p.mean[b];
+    }
+    lay_curves(c, &p);
     for (size_t b = 0; b < p.count; b++)
-      for (size_t w = 0; w < sizeof sigmas / sizeof *sigmas; w++) {
-        const double gain = fit_linear(&p, p.s[b], sigmas[w], one);
+      for (size_t w = 0; w < WIDTHS; w++) {
+        const double gain = fit_linear(&p, c, b, w, n, v1, one);
         if (!(gain > most))
           continue;
         most = gain;
-        one[ANGLE] = angle;
         memcpy(parameter, one, sizeof one);
       }
   }
+  free(c);
 }
 
 static tal_fit solve(const tal_field *scaled, const double start[PARAMETERS]) {

@@ -165,7 +165,7 @@ static void draw_per_frame(tal_plot *plot, const tal_measuring *run, const figur
 }
 
 void tal_measure_curves_draw(tal_measuring *run) {
-  for (size_t k = 0; k < sizeof figures / sizeof *figures && run->status != TAL_INTERRUPTED; k++) {
+  for (size_t k = 0; k < sizeof figures / sizeof *figures && !tal_measure_stopped(run); k++) {
     const figure *f = &figures[k];
     tal_plot plot;
     tal_error err;

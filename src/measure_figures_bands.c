@@ -105,7 +105,7 @@ static void draw_arrows(tal_measuring *run, const tal_part *part, const tal_fluc
 
 static bool begin_curves(tal_plot *plot, tal_measuring *run, const char *title, const char *x, const char *y) {
   tal_error err;
-  const tal_status status = run->status == TAL_INTERRUPTED ? TAL_INTERRUPTED : tal_plot_begin(plot, run->out, &err);
+  const tal_status status = tal_measure_stopped(run) ? TAL_INTERRUPTED : tal_plot_begin(plot, run->out, &err);
   if (status == TAL_INTERRUPTED)
     return false;
   if (status) {

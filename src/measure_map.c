@@ -13,6 +13,13 @@ void tal_measure_failed(tal_measuring *run, tal_status status, const tal_error *
   run->err = *err;
 }
 
+bool tal_measure_stopped(tal_measuring *run) {
+  const tal_measure_options *options = run->options;
+  if (run->status != TAL_INTERRUPTED && options->stop && options->stop(options->user))
+    run->status = tal_fail(&run->err, TAL_INTERRUPTED, "%s: stopped", run->dir);
+  return run->status == TAL_INTERRUPTED;
+}
+
 void tal_measure_plot_end(tal_plot *plot, tal_measuring *run, const char *name) {
   char file[80], path[TAL_PATH_SIZE];
   tal_error err;
@@ -30,7 +37,7 @@ bool tal_measure_map_begin(tal_measure_map *m, tal_measuring *run, const char *w
   char state[64];
   tal_error err;
   *m = (tal_measure_map){.data.facts.name = run->name};
-  if (run->status == TAL_INTERRUPTED)
+  if (tal_measure_stopped(run))
     return false;
   tal_status status = tal_frame_read(&m->data.last, run->choice.frames.entry[run->frame].path, &err);
   if (status || m->data.last.grain_count == 0) {

@@ -29,6 +29,8 @@ void tal_measure_map_cells(tal_measure_map *m, const tal_snapshot *s, const doub
 
 // A figure that is no map: begin with tal_plot_begin on run->out; this ends it as OUT/name.png and tells.
 void tal_measure_plot_end(tal_plot *plot, tal_measuring *run, const char *name);
+// Whether the user wants no more frames and figures.
+bool tal_measure_stopped(tal_measuring *run);
 // Keeps the first failure.
 void tal_measure_failed(tal_measuring *run, tal_status status, const tal_error *err);
 

@@ -8,6 +8,7 @@
 #include <gsl/gsl_statistics_double.h>
 #include <math.h>
 #include <stdlib.h>
+#include <string.h>
 
 // ---- the earlier instant ----
 
@@ -37,6 +38,17 @@ tal_status tal_earlier_read(tal_earlier *earlier, const char *path, tal_error *e
   if (status)
     tal_earlier_clear(earlier);
   return status;
+}
+
+tal_earlier tal_earlier_of(const tal_snapshot *s) {
+  const size_t n = s->grain_count, size = n * sizeof(double);
+  return (tal_earlier){.time = s->time,
+                       .axial_strain = s->axial_strain,
+                       .count = n,
+                       .id = memcpy(tal_alloc(n, sizeof *s->id), s->id, n * sizeof *s->id),
+                       .x = memcpy(tal_alloc(n, sizeof(double)), s->x, size),
+                       .y = memcpy(tal_alloc(n, sizeof(double)), s->y, size),
+                       .theta = memcpy(tal_alloc(n, sizeof(double)), s->theta, size)};
 }
 
 void tal_earlier_clear(tal_earlier *earlier) {
@@ -162,10 +174,11 @@ void tal_motion_clear(tal_motion *m) {
 
 // ---- correlation of rotations ----
 
-// Known grains in square buckets as wide as the longest distance.
+// Known grains in square buckets half as wide as the longest distance, row after row.
 typedef struct buckets {
   size_t columns, rows, *first; // [columns * rows + 1]
-  int32_t *grain;
+  int32_t *grain;               // owned, as first
+  double width;
 } buckets;
 
 static size_t bucket_of(double x, double low, double width, size_t count) {
@@ -183,7 +196,9 @@ static buckets fill_buckets(const tal_part *part, const tal_motion *m, double wi
     y0 = fmin(y0, s->y[k]), y1 = fmax(y1, s->y[k]);
   }
   // Grains that flew off must not make the grid large: its ends are open.
-  buckets b = {.columns = (size_t)fmin(1000, 1 + (x1 - x0) / width), .rows = (size_t)fmin(1000, 1 + (y1 - y0) / width)};
+  buckets b = {.columns = (size_t)fmin(1000, 1 + (x1 - x0) / width),
+               .rows = (size_t)fmin(1000, 1 + (y1 - y0) / width),
+               .width = width};
   b.first = tal_alloc(b.columns * b.rows + 2, sizeof *b.first);
   b.grain = tal_alloc(m->known_count, sizeof *b.grain);
   for (int filling = 0; filling < 2; filling++) {
@@ -202,39 +217,52 @@ static buckets fill_buckets(const tal_part *part, const tal_motion *m, double wi
   return b;
 }
 
+// Of the grains in the order of the buckets, so that a run of them lies together in memory.
 typedef struct correlating {
-  const tal_snapshot *s;
-  const double *rotation, *magnitude; // less their means
+  const double *x, *y, *rotation, *magnitude; // rotations less their means
+  double limit;                               // squared
   tal_rotation_correlation *out;
 } correlating;
 
-static void pair_up(const correlating *c, int32_t a, int32_t b) {
-  const double dx = c->s->x[a] - c->s->x[b], dy = c->s->y[a] - c->s->y[b];
-  const double r = sqrt(dx * dx + dy * dy) / c->out->width; // hypot took half of the time
-  if (r >= TAL_CORRELATION_BINS)
-    return;
-  const size_t k = (size_t)r;
-  c->out->pairs[k]++;
-  c->out->rotation[k] += c->rotation[a] * c->rotation[b];
-  c->out->magnitude[k] += c->magnitude[a] * c->magnitude[b];
+static void pair_run(const correlating *c, size_t a, size_t begin, size_t end) {
+  for (size_t b = begin; b < end; b++) {
+    const double dx = c->x[a] - c->x[b], dy = c->y[a] - c->y[b], square = dx * dx + dy * dy;
+    if (square >= c->limit)
+      continue;
+    const double r = sqrt(square) / c->out->width; // hypot took half of the time
+    const size_t k = r < TAL_CORRELATION_BINS ? (size_t)r : TAL_CORRELATION_BINS - 1;
+    c->out->pairs[k]++;
+    c->out->rotation[k] += c->rotation[a] * c->rotation[b];
+    c->out->magnitude[k] += c->magnitude[a] * c->magnitude[b];
+  }
 }
 
-// Each pair once: within a bucket, and with the four buckets ahead.
+// Each pair once: with what follows in the bucket and in the two beside it, and with five buckets of either row ahead.
 static void pair_buckets(const correlating *c, const buckets *b, size_t row, size_t column) {
-  static const int ahead[4][2] = {{0, 1}, {1, -1}, {1, 0}, {1, 1}};
-  const size_t here = row * b->columns + column;
+  const size_t here = row * b->columns + column, left = column > 2 ? column - 2 : 0,
+               right = column + 2 < b->columns ? column + 2 : b->columns - 1;
   for (size_t p = b->first[here]; p < b->first[here + 1]; p++) {
-    for (size_t q = p + 1; q < b->first[here + 1]; q++)
-      pair_up(c, b->grain[p], b->grain[q]);
-    for (int k = 0; k < 4; k++) {
-      const size_t other_row = row + (size_t)ahead[k][0], other_column = column + (size_t)ahead[k][1]; // wraps below 0
-      if (other_row >= b->rows || other_column >= b->columns)
-        continue;
-      const size_t there = other_row * b->columns + other_column;
-      for (size_t q = b->first[there]; q < b->first[there + 1]; q++)
-        pair_up(c, b->grain[p], b->grain[q]);
-    }
+    pair_run(c, p, p + 1, b->first[row * b->columns + right + 1]);
+    for (size_t ahead = row + 1; ahead <= row + 2 && ahead < b->rows; ahead++)
+      pair_run(c, p, b->first[ahead * b->columns + left], b->first[ahead * b->columns + right + 1]);
   }
+}
+
+static void pair_all(const buckets *b, const tal_snapshot *s, const double *rotation, const double *magnitude,
+                     tal_rotation_correlation *out) {
+  const size_t n = b->first[b->columns * b->rows];
+  double *all = tal_alloc(4 * n + 1, sizeof *all);
+  for (size_t k = 0; k < n; k++) {
+    all[k] = s->x[b->grain[k]];
+    all[n + k] = s->y[b->grain[k]];
+    all[2 * n + k] = rotation[b->grain[k]];
+    all[3 * n + k] = magnitude[b->grain[k]];
+  }
+  const correlating c = {all, all + n, all + 2 * n, all + 3 * n, 4 * b->width * b->width, out};
+  for (size_t row = 0; row < b->rows; row++)
+    for (size_t column = 0; column < b->columns; column++)
+      pair_buckets(&c, b, row, column);
+  free(all);
 }
 
 static void decay(void *context, const double *parameter, double *value) {
@@ -289,11 +317,8 @@ tal_rotation_correlation tal_rotation_correlate(const tal_part *part, const tal_
     magnitude[k] = fabs(m->turn[k]);
   }
   const double v = centre(m, s->grain_count, rotation), w = centre(m, s->grain_count, magnitude);
-  buckets b = fill_buckets(part, m, TAL_CORRELATION_BINS * c.width);
-  const correlating pairs = {s, rotation, magnitude, &c};
-  for (size_t row = 0; row < b.rows; row++)
-    for (size_t column = 0; column < b.columns; column++)
-      pair_buckets(&pairs, &b, row, column);
+  buckets b = fill_buckets(part, m, TAL_CORRELATION_BINS * c.width / 2);
+  pair_all(&b, s, rotation, magnitude, &c);
   for (size_t k = 0; k < TAL_CORRELATION_BINS; k++) {
     c.rotation[k] = c.pairs[k] && v > 0 ? c.rotation[k] / ((double)c.pairs[k] * v) : 0;
     c.magnitude[k] = c.pairs[k] && w > 0 ? c.magnitude[k] / ((double)c.pairs[k] * w) : 0;

@@ -12,6 +12,7 @@ typedef struct tal_earlier {
   double *x, *y, *theta;     // owned; [count] [m], [rad]
   double time, axial_strain; //
 } tal_earlier;
+tal_earlier tal_earlier_of(const tal_snapshot *snapshot);
 // As tal_snapshot_read.
 tal_status tal_earlier_read(tal_earlier *earlier, const char *path, tal_error *err);
 void tal_earlier_clear(tal_earlier *earlier);

@@ -17,6 +17,8 @@ typedef struct state {
   tal_window_plan plan;
   tal_boxes boxes;
   tal_windows windows[2]; // shear, rotation
+  tal_earlier kept;       // of frame number kept_frame, where a window begins
+  size_t kept_frame;
 } state;
 
 static void *create(tal_measuring *run) {
@@ -223,27 +225,45 @@ static void measure_window(state *at, tal_measuring *run, const tal_part *part, 
   free(f.grain);
 }
 
-static void frame(void *context, tal_measuring *run, const tal_part *part) {
-  state *at = context;
-  const size_t from = at->plan.from[run->frame];
-  tal_earlier earlier;
+static void measure_from(state *at, tal_measuring *run, const tal_part *part, const tal_earlier *earlier) {
   tal_motion motion;
-  tal_error err;
-  if (from == SIZE_MAX)
-    return;
-  const tal_status status = tal_earlier_read(&earlier, run->choice.frames.entry[from].path, &err);
-  if (status) {
-    tal_measure_failed(run, status, &err);
-    return;
-  }
-  if (at->plan.end[run->frame] && from == at->plan.first)
-    tal_boxes_lay(&at->boxes, &earlier, box_side * part->mean_diameter);
-  tal_motion_find(&motion, part, &earlier);
+  if (at->plan.end[run->frame] && at->plan.from[run->frame] == at->plan.first)
+    tal_boxes_lay(&at->boxes, earlier, box_side * part->mean_diameter);
+  tal_motion_find(&motion, part, earlier);
   if (at->plan.end[run->frame])
     keep_for_persistence(at, part, &motion);
   measure_window(at, run, part, &motion);
   tal_motion_clear(&motion);
+}
+
+// Windows follow each other, so that only a frame of --at that ends none has to read where it began.
+static void measure_frame(state *at, tal_measuring *run, const tal_part *part) {
+  const size_t from = at->plan.from[run->frame];
+  tal_earlier earlier;
+  tal_error err;
+  tal_status status;
+  if (at->kept.id && from == at->kept_frame) {
+    measure_from(at, run, part, &at->kept);
+    return;
+  }
+#pragma omp critical(tal_store)
+  status = tal_earlier_read(&earlier, run->choice.frames.entry[from].path, &err);
+  if (status)
+    tal_measure_failed(run, status, &err);
+  else
+    measure_from(at, run, part, &earlier);
   tal_earlier_clear(&earlier);
+}
+
+static void frame(void *context, tal_measuring *run, const tal_part *part) {
+  state *at = context;
+  if (at->plan.from[run->frame] != SIZE_MAX)
+    measure_frame(at, run, part);
+  if (run->frame != at->plan.first && !at->plan.end[run->frame])
+    return;
+  tal_earlier_clear(&at->kept);
+  at->kept = tal_earlier_of(part->of);
+  at->kept_frame = run->frame;
 }
 
 // ---- persistence ----
@@ -268,6 +288,7 @@ static void finish(void *context, tal_measuring *run) {
     tal_persistence_draw(run, at->windows, at->plan.step);
   for (int which = 0; which < 2; which++)
     tal_windows_clear(&at->windows[which]);
+  tal_earlier_clear(&at->kept);
   tal_boxes_clear(&at->boxes);
   tal_window_plan_clear(&at->plan);
   free(at);

@@ -90,6 +90,8 @@ static void draw(tal_measuring *run, const tal_part *part, const tal_forces *f) 
   tal_plot plot;
   tal_error err;
   char name[40];
+  if (tal_measure_stopped(run))
+    return;
   const tal_status status = tal_plot_begin(&plot, run->out, &err);
   if (status) {
     tal_measure_failed(run, status, &err);

@@ -8,6 +8,7 @@
 #include <cmocka.h>
 
 #include "program.h"
+#include <dirent.h>
 
 static const char lattice[] = "name: lattice\n"
                               "grains: {radius: {law: uniform, min: 1e-3, max: 1e-3}, thickness: 2e-3}\n"
@@ -122,7 +123,8 @@ static void test_agrees_with_the_series(void **state) {
                                  {"stress_xy[Pa]", "sigma_xy[Pa]"},
                                  {"stress_yy[Pa]", "sigma_yy[Pa]"},
                                  {"contact_xx", "fabric_xx"},
-                                 {"contact_xy", "fabric_xy"}};
+                                 {"contact_xy", "fabric_xy"}},
+                    *const counted[] = {"coordination", "coordination_bearing", "solid_fraction"};
   size_t frames = 0;
   text = program_read(p, "out/measure/tensors.csv", &size);
   for (const char *at = text; (at = strstr(at, ",all,")); at++)
@@ -134,6 +136,74 @@ static void test_agrees_with_the_series(void **state) {
                  series = cell_of(p, "out/series.csv", same[k][1], rows - 2, "");
     assert_near(mine, series, 1e-10 * (k < 3 ? scale : 1));
   }
+  for (size_t k = 0; k < sizeof counted / sizeof *counted; k++)
+    assert_near(cell_of(p, "out/measure/voids.csv", counted[k], frames - 1, ""),
+                cell_of(p, "out/series.csv", counted[k], rows - 2, ""), 1e-11);
+}
+
+// EXACT: tables are the same to the byte with one thread and with two, and whichever frames get lists.
+static void test_threads(void **state) {
+  program *p = *state;
+  run_biaxial(p);
+  setenv("OMP_NUM_THREADS", "1", 1);
+  measure(p, WORDS("measure", "out", "--no-figures", "--over", "0.01", "-o", "one"));
+  setenv("OMP_NUM_THREADS", "2", 1);
+  measure(p, WORDS("measure", "out", "--no-figures", "--over", "0.01", "-o", "two"));
+  measure(p, WORDS("measure", "out", "--no-figures", "--over", "0.01", "--at", "all", "-o", "lists"));
+  unsetenv("OMP_NUM_THREADS");
+  static const char *const tables[] = {"bands.csv",  "buckling.csv",    "chain_lives.csv", "chains.csv",
+                                       "forces.csv", "persistence.csv", "tensors.csv",     "voids.csv"};
+  for (size_t k = 0; k < sizeof tables / sizeof *tables; k++) {
+    uint64_t hash[3];
+    const char *const folders[3] = {"one", "two", "lists"};
+    for (int f = 0; f < 3; f++) {
+      char name[80];
+      snprintf(name, sizeof name, "%s/%s", folders[f], tables[k]);
+      hash[f] = content_hash(program_path(p, name));
+    }
+    assert_true(hash[0] != 0 && hash[0] == hash[1]);
+    if (k > 0) // bands.csv has a row per frame of --at
+      assert_true(hash[0] == hash[2]);
+  }
+}
+
+// Whether a name in the folder contains `text`.
+static bool folder_has(program *p, const char *folder, const char *text) {
+  DIR *list = opendir(program_path(p, folder));
+  bool found = false;
+  for (struct dirent *entry; list && (entry = readdir(list));)
+    found |= strstr(entry->d_name, text) != NULL;
+  if (list)
+    closedir(list);
+  return found;
+}
+
+// EXACT: Ctrl-C while a figure is drawn ends with 75 and leaves nothing half done; a frame that is damaged further on
+// leaves no tables.
+static void test_leaves_nothing(void **state) {
+  program *p = *state;
+  outcome got;
+  run_biaxial(p);
+  process child = program_start(p, WORDS("measure", "out", "--at", "all", "-o", "stopped"), NULL);
+  while (!folder_has(p, "stopped", ".plot-") && kill(child.id, 0) == 0)
+    usleep(1000);
+  kill(child.id, SIGINT);
+  process_wait(&child, &got);
+  assert_int_equal(got.code, 75);
+  assert_non_null(strstr(got.err, "stopped after "));
+  assert_false(folder_has(p, "stopped", ".plot-") || folder_has(p, "stopped", ".tmp") ||
+               folder_has(p, "stopped", ".csv"));
+  FILE *file = fopen(program_path(p, "out/fields/000002.h5"), "r+");
+  assert_non_null(file);
+  fseek(file, 5000, SEEK_SET);
+  const int byte = getc(file);
+  fseek(file, 5000, SEEK_SET);
+  putc(byte ^ 1, file);
+  fclose(file);
+  program_run(p, WORDS("measure", "out", "--no-figures", "-o", "damaged"), &got);
+  assert_int_equal(got.code, 2);
+  assert_non_null(strstr(got.err, "000002.h5"));
+  assert_false(folder_has(p, "damaged", ".csv"));
 }
 
 // EXACT: a lattice that does not touch, and one grain: all tables are there, nothing in them is no number.
@@ -230,6 +300,8 @@ static void test_damaged_frame(void **state) {
 int main(void) {
   const struct CMUnitTest tests[] = {
       program_test(test_agrees_with_the_series),
+      program_test(test_threads),
+      program_test(test_leaves_nothing),
       program_test(test_no_contacts),
       program_test(test_empty_regions),
       program_test(test_refusals),
