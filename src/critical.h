@@ -10,7 +10,7 @@ double tal_critical_step(const tal_sim *sim);
 // The critical step of one contact of the given tangent stiffness [N/m], damping [N s/m] and reduced mass [kg].
 double tal_critical_step_pair(double stiffness, double damping, double reduced_mass);
 // phi above which inertia is no longer negligible: chapter 7 of docs/method.md.
-#define TAL_QUASISTATIC_LIMIT 0.01
+#define TAL_QUASISTATIC_LIMIT 1e-3
 // phi [P 2.12, 2.B1] for a rate [1/s], a pressure [Pa] and a height [m]; psi = 2R/L.
 double tal_quasistatic_coefficient(const tal_sim *sim, double rate, double pressure, double height);
 // Largest overlap over the smaller radius (walls: the grain's radius); *grain: who, -1 without contacts.

@@ -236,11 +236,11 @@ static void test_quasistatic(void **state) {
     snprintf(set, sizeof set, "mass_scaling=%g", slow ? 0.9 * strtod(scaling, NULL) : 1e5);
     program_run(p, WORDS("check", "s.yaml", "--set", set), &got);
     assert_outcome("check", &got, 0, "");
-    assert_int_equal(strstr(got.out, "is not quasi-static: phi above 0.01") != NULL, !slow);
+    assert_int_equal(strstr(got.out, "is not quasi-static: phi above 0.001") != NULL, !slow);
     memcpy(answer, got.out, sizeof answer);
-    scaling = strstr(answer, "phi is 0.01 at mass_scaling ");
+    scaling = strstr(answer, "phi is 0.001 at mass_scaling ");
     assert_non_null(scaling);
-    scaling += strlen("phi is 0.01 at mass_scaling ");
+    scaling += strlen("phi is 0.001 at mass_scaling ");
     double bound = strtod(scaling, NULL);
     snprintf(warned, sizeof warned, "%s", slow ? "still" : "heavy");
     program_run(p, WORDS("run", "s.yaml", "-o", warned, "-q", "--no-figures", "--set", set), &got);
