@@ -5,15 +5,12 @@ The tables are `study.csv` of `talus study`. Errors in per cent of the reference
 each setting its cost, CPU seconds relative to the reference."""
 import csv
 import math
-import os
 import sys
 
-WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 380, 250, 44, 34, 46
+WIDTH, HEIGHT, LEFT, TOP, BOTTOM = 480, 270, 44, 34, 52
 COLOURS = {"mean_slip": "#0072b2", "stress_ratio": "#d55e00", "volumetric_strain": "#009e73", "coordination": "#000"}
 NAMES = {"mean_slip": "slip", "stress_ratio": "stress ratio", "volumetric_strain": "volumetric strain",
          "coordination": "coordination"}
-KEY = ("setting", "metric", "reference", "n", "mean", "standard_error", "error", "error_standard_error",
-       "error_relative")
 
 
 def number(text):
@@ -27,6 +24,11 @@ def quantity(metric):
 def rows_of(path):
     with open(path, newline="", encoding="utf-8") as file:
         return [row for row in csv.DictReader(file) if quantity(row["metric"])]
+
+
+def dials(rows):
+    """Names of the columns between the setting and the metric."""
+    return list(rows[0])[1:list(rows[0]).index("metric")]
 
 
 def text(x, y, what, size=11, anchor="middle", colour="#222"):
@@ -57,7 +59,7 @@ def panel(path, x0, y0):
         value = max(-reach, min(reach, value))
         return (y0 + TOP + bottom) / 2 - value / reach * (bottom - y0 - TOP) / 2 * 0.96
 
-    out = [text(x0 + LEFT, y0 + 20, os.path.basename(path)[:-4], 14, "start"),
+    out = [text(x0 + LEFT, y0 + 20, ", ".join(dials(rows)), 14, "start"),
            text(right, y0 + 20, "reference " + reference["setting"], 11, "end", "#666"),
            f'<rect x="{x0 + LEFT}" y="{y0 + TOP}" width="{right - x0 - LEFT}" height="{bottom - y0 - TOP}" '
            'fill="none" stroke="#bbb"/>']
@@ -70,9 +72,12 @@ def panel(path, x0, y0):
         tick += 1
     for k, setting in enumerate(settings):
         cost = next(number(r["cpu_time[s]"]) for r in rows if r["setting"] == setting)
-        out.append(text(across(k), bottom + 15, setting, 10 if len(settings) < 7 else 7))
+        size = 10 if len(settings) < 7 else 8
+        values = [value.split("=")[-1] for value in setting.split(", ")]
+        for line, value in enumerate(values):
+            out.append(text(across(k), bottom + 13 + 11 * line, value, size))
         share = cost / number(reference["cpu_time[s]"])
-        out.append(text(across(k), bottom + 28, f"{share:.2g}", 10 if len(settings) < 7 else 7, colour="#666"))
+        out.append(text(across(k), bottom + 13 + 11 * len(values), f"{share:.2g}", size, colour="#666"))
         for m, metric in enumerate(metrics):
             error, deviation = points.get((setting, metric), (math.nan, math.nan))
             if not math.isfinite(error):
@@ -87,7 +92,7 @@ def panel(path, x0, y0):
     return out
 
 
-paths, columns = sys.argv[1:], 3
+paths, columns = sys.argv[1:], 2
 lines = math.ceil(len(paths) / columns)
 print(f'<svg xmlns="http://www.w3.org/2000/svg" font-family="DejaVu Sans,sans-serif" '
       f'viewBox="0 0 {columns * WIDTH} {lines * HEIGHT + 50}">')
