@@ -9,6 +9,7 @@
 
 #include "continuum.h"
 #include "engine.h"
+#include "step.h"
 #include <omp.h>
 
 static const double pressure = 100e3, thickness = 1.5e-3;
@@ -200,6 +201,58 @@ static void end_of_confinement(void **state) {
                  "friction: 0.1, integrator: {scheme: implicit_friction, dt: 1e-4}}]\n");
 }
 
+static double sideways(const tal_sim *sim) {
+  double sum = 0;
+  for (size_t i = 0; i < sim->grains.count; i++)
+    sum += sim->grains.bx[i];
+  return sum;
+}
+
+// ROUND: between plates the pressure pushes nothing sideways, whatever the heights at which the pressed arcs end; and
+// the two plates slide by as much against each other.
+static void pressure_between_plates(void **state) {
+  (void)state;
+  engine *e = sample("contact: {tangential: spring}\nstages: [{kind: confine, pressure: 100e3, ramp: 0.05, friction: "
+                     "0.1, tolerance: 0.9, unbalanced: 9}, {kind: compress, rate: 0.2, strain: 0.002}]\n");
+  int uneven = 0;
+  double slid = 0;
+  while (!tal_sim_done(e->sim)) {
+    engine_step(e);
+    const tal_run *run = &e->sim->run;
+    const int32_t *node = e->sim->graph.loop.node;
+    const double *y = e->sim->grains.y, line = run->pressure * thickness;
+    const double rise = y[node[run->arc_bottom_right]] - y[node[run->arc_bottom_left]];
+    uneven += fabs(rise) > 0.05e-3;
+    if (!(fabs(sideways(e->sim)) <= 1e-12 * line * 22e-3))
+      fail_msg("step %lld: %.3g N sideways", (long long)run->step, sideways(e->sim));
+    const double bottom = tal_walls_plate(&e->sim->walls, 1)->vx, top = tal_walls_plate(&e->sim->walls, -1)->vx;
+    assert_true(bottom == -top);
+    slid = fmax(slid, fabs(top));
+  }
+  assert_true(uneven > 100 && slid > 0);
+  assert_true(tal_walls_plate(&e->sim->walls, 1)->vx == 0); // they stand still in a compression
+  engine_end(e);
+}
+
+// EXACT: a grain that has left the assembly along a plate ends no arc, and the loop does not follow it.
+static void grain_that_left(void **state) {
+  (void)state;
+  engine *e = sample("contact: {tangential: spring}\nstages: [" CONFINE "]\n");
+  engine_finish(e);
+  tal_sim *sim = e->sim;
+  const int32_t gone = sim->graph.loop.node[sim->run.arc_bottom_right];
+  sim->grains.x[gone] += 20e-3;
+  sim->grains.y[gone] = tal_walls_plate(&sim->walls, 1)->y0 + sim->grains.r[gone];
+  tal_neighbours_rebuild(sim);
+  tal_error err;
+  sim->run.bedding = 0;
+  assert_int_equal(tal_step_refresh(sim, &err), TAL_OK);
+  for (size_t k = 0; k < sim->graph.loop.count; k++)
+    assert_int_not_equal(sim->graph.loop.node[k], gone);
+  assert_int_not_equal(sim->graph.loop.node[sim->run.arc_bottom_right], gone);
+  engine_end(e);
+}
+
 // MODEL: a cut assembly has no plates: its whole loop is pressed, and at rest the stress is p to the remaining motion.
 static void cut_assembly(void **state) {
   (void)state;
@@ -329,6 +382,8 @@ int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(identities),
       cmocka_unit_test(end_of_confinement),
+      cmocka_unit_test(pressure_between_plates),
+      cmocka_unit_test(grain_that_left),
       cmocka_unit_test(cut_assembly),
       cmocka_unit_test(friction_sets_the_density),
       cmocka_unit_test(strains_of_a_compression),
