@@ -69,7 +69,7 @@ static void resolve_stage_integrator(const tal_scene *scene, tal_scene_stage *st
   if (own.sweeps > 0)
     stage->integrator.sweeps = own.sweeps;
   if (stage->integrator.sweeps < 1)
-    stage->integrator.sweeps = 4;
+    stage->integrator.sweeps = 2;
   if (!isnan(own.tolerance))
     stage->integrator.tolerance = own.tolerance;
 }

@@ -335,7 +335,8 @@ static double friction_work(const tal_sim *sim) {
 static void test_work(void **state) {
   (void)state;
   for (double mu = 0.1; mu < 3; mu *= 4.4) {
-    engine *e = start_cloud(9, 7, regularised, "gravity: [0, -20]\nwalls: [{from: [-90, -1], to: [90, -1]}]\n", 1e-3);
+    engine *e = start_cloud(
+        9, 7, regularised, "limits: {overlap: 1}\ngravity: [0, -20]\nwalls: [{from: [-90, -1], to: [90, -1]}]\n", 1e-3);
     e->sim->friction = mu;
     tal_neighbours_rebuild(e->sim);
     for (int s = 0; s < 3000; s++) {
