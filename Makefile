@@ -47,7 +47,7 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers format format-check install clean deps \
+.PHONY: all demo test build-tests run-tests hard run-hard short asan tsan bench bench-peers format format-check install clean deps \
   deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
@@ -91,6 +91,12 @@ test: deps-program
 build-tests: $(OUT)/talus $(TESTS) $(BENCHES)
 run-tests: $(OUT)/talus $(TESTS)
 	@TALUS=$(OUT)/talus sh tests/run.sh $(TESTS)
+# The hard cases: a table of what holds how far, and what happens beyond. LONG=1 adds hours.
+HARD := $(patsubst %.c,$(OUT)/%,$(wildcard tests/hard_*.c))
+hard: deps-program
+	@$(MAKE) --no-print-directory $(JOBS) run-hard
+run-hard: $(OUT)/talus $(HARD)
+	@HARD=$(if $(LONG),long,plain) TALUS=$(OUT)/talus sh tests/hard.sh $(HARD)
 asan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=asan run-tests
 # gcc's OpenMP runtime is not instrumented; clang's says through Archer what it orders, so a report is a race of ours.

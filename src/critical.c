@@ -64,12 +64,21 @@ static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, dou
   }
 }
 
-double tal_critical_step(const tal_sim *sim) {
+// Smaller of `least` and the limit of one contact; names its grain.
+static void take_least(double candidate, int64_t id, double *least, int64_t *grain) {
+  if (!(candidate < *least))
+    return;
+  *least = candidate;
+  *grain = id;
+}
+
+double tal_critical_step_where(const tal_sim *sim, int64_t *grain) {
   const tal_grains *g = &sim->grains;
   double(*sum)[2] = tal_alloc(g->count, sizeof *sum);
   add_slots(sim, &sim->pairs, true, sum);
   add_slots(sim, &sim->wall_contacts, false, sum);
   double least = (double)INFINITY;
+  *grain = -1;
   if (sim->boundary && sim->boundary->critical)
     least = sim->boundary->critical(sim, sum);
   const tal_contacts *s = &sim->pairs;
@@ -77,18 +86,24 @@ double tal_critical_step(const tal_sim *sim) {
     if (pair_overlap(sim, c) <= 0)
       continue;
     int32_t i = s->i[c], j = s->j[c];
-    least = fmin(least, limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
-                              sum[i][1] * g->inverse_mass[i] + sum[j][1] * g->inverse_mass[j]));
+    take_least(limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
+                     sum[i][1] * g->inverse_mass[i] + sum[j][1] * g->inverse_mass[j]),
+               g->id[i], &least, grain);
   }
   s = &sim->wall_contacts;
   for (size_t c = 0; c < s->count; c++) {
     if (s->overlap[c] <= 0)
       continue;
     int32_t i = s->i[c];
-    least = fmin(least, limit(sum[i][0] * g->inverse_mass[i], sum[i][1] * g->inverse_mass[i]));
+    take_least(limit(sum[i][0] * g->inverse_mass[i], sum[i][1] * g->inverse_mass[i]), g->id[i], &least, grain);
   }
   free(sum);
   return least;
+}
+
+double tal_critical_step(const tal_sim *sim) {
+  int64_t grain;
+  return tal_critical_step_where(sim, &grain);
 }
 
 double tal_quasistatic_coefficient(const tal_sim *sim, double rate, double pressure, double height) {

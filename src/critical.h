@@ -7,6 +7,8 @@
 // Largest stable step [s] of the integrator for the graph of contacts as it stands, eq (26): a bound from below
 // (element by element, masses shared by stiffness), exact for two grains. INFINITY without contacts.
 double tal_critical_step(const tal_sim *sim);
+// The same; *grain: id of a grain at the contact that sets it, -1 where no contact does.
+double tal_critical_step_where(const tal_sim *sim, int64_t *grain);
 // The critical step of one contact of the given tangent stiffness [N/m], damping [N s/m] and reduced mass [kg].
 double tal_critical_step_pair(double stiffness, double damping, double reduced_mass);
 // phi above which inertia is no longer negligible: chapter 7 of docs/method.md.

@@ -3,6 +3,7 @@
 #include "effects.h"
 #include "forces.h"
 #include "law.h"
+#include "step.h"
 
 double tal_energy_kinetic(const tal_grains *g) {
   double sum = 0;
@@ -117,6 +118,30 @@ static tal_membrane_power membrane_works(const tal_sim *sim) {
                               .lost = run->membrane_lost_work - half * run->membrane_lost_power};
 }
 
+double tal_energy_scale(const tal_sim *sim, const tal_row *row) {
+  const tal_run *run = &sim->run;
+  return fabs(row->work_walls) + fabs(row->work_pressure) + fabs(row->work_minimal) + fabs(row->work_membrane) +
+         fabs(row->work_held) + fabs(row->dissipated_friction) + fabs(row->dissipated_damping) +
+         fabs(row->gravity - run->gravity0) + run->kinetic0 + run->elastic0;
+}
+
+double tal_energy_of_a_step(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  const double dt = tal_step_longest(sim);
+  double sum = 0;
+  for (size_t i = 0; i < g->count; i++) {
+    const tal_resultant f = tal_forces_gather(sim, i);
+    const double elastic = hypot(f.elastic_x, f.elastic_y), all = hypot(g->fx[i], g->fy[i]);
+    sum +=
+        dt * elastic * hypot(g->vx[i], g->vy[i]) + dt * dt * g->inverse_mass[i] * all * (0.125 * all + 0.25 * elastic);
+  }
+  for (size_t w = 0; w < sim->walls.count; w++) {
+    const tal_wall *wall = &sim->walls.wall[w];
+    sum += dt * fabs(wall->fx * wall->vx + wall->fy * wall->vy);
+  }
+  return sum;
+}
+
 void tal_energy_row(const tal_sim *sim, tal_row *row) {
   const tal_run *run = &sim->run;
   const power work = grain_works(sim);
@@ -140,9 +165,6 @@ void tal_energy_row(const tal_sim *sim, tal_row *row) {
   double change = row->kinetic - run->kinetic0 + row->elastic - run->elastic0 + row->gravity - run->gravity0;
   double input = wall + row->work_pressure + row->work_minimal + row->work_membrane + work.held;
   double missing = change + row->dissipated_friction + row->dissipated_damping - input;
-  // The scale: everything that changed hands, and what was there to begin with.
-  double scale = fabs(wall) + fabs(row->work_pressure) + fabs(row->work_minimal) + fabs(row->work_membrane) +
-                 fabs(work.held) + fabs(row->dissipated_friction) + fabs(row->dissipated_damping) +
-                 fabs(row->gravity - run->gravity0) + run->kinetic0 + run->elastic0;
+  double scale = tal_energy_scale(sim, row);
   row->energy_residual = scale > 0 ? missing / scale : 0;
 }

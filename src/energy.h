@@ -16,5 +16,10 @@ double tal_energy_normal(const tal_sim *sim, const tal_contacts *slots, size_t c
 void tal_energy_credit(tal_sim *sim, double weight);
 // Fills the ledger columns of a row from an observed instant.
 void tal_energy_row(const tal_sim *sim, tal_row *row);
+// What the residual of a row is a share of [J]: everything that changed hands, and what was there to begin with.
+double tal_energy_scale(const tal_sim *sim, const tal_row *row);
+// What the ledger cannot know of this instant [J], eq (D5): the work of one step, and how far full-step energies swing
+// about the conserved one.
+double tal_energy_of_a_step(const tal_sim *sim);
 
 #endif

@@ -270,6 +270,7 @@ static bool walls_changed(const tal_sim *sim) {
 bool tal_neighbours_stale(tal_sim *sim, double step) {
   tal_neighbours *n = &sim->neighbours;
   const double walls = largest_wall_displacement(sim);
+  n->stride = step;
   if (walls_changed(sim))
     return true;
   n->moved += step;

@@ -6,6 +6,7 @@
 #include "files.h"
 #include "forced.h"
 #include "forces.h"
+#include "inspect.h"
 #include "integrate.h"
 #include "output.h"
 #include "progress.h"
@@ -55,7 +56,8 @@ typedef struct job {
   tal_sim *sim;
   tal_output *output;
   tal_progress progress;
-  tal_row row;
+  tal_row row;                 // of the last look at the ledger
+  int64_t looked;              // step of that look, -1: none yet
   tal_stage_report *stages;    // owned; [stage_count]
   double started, cpu_started; // [s] clocks when this part of the run began
   double stage_started, stage_cpu_started;
@@ -110,9 +112,17 @@ static tal_status report_run(job *this, const char *name, const char *reason, ta
   return tal_output_report(this->output, this->sim, &report, err);
 }
 
-// Nothing that has gone bad is written.
+// Nothing that has gone bad is written. Leaves the row of this instant.
 static tal_status inspect(job *this, tal_error *err) {
-  return tal_step_inspect(this->sim, err);
+  tal_status status = tal_inspect(this->sim, err);
+  if (status || this->looked == this->sim->run.step)
+    return status;
+  const tal_row before = this->row;
+  tal_sim_row(this->sim, &this->row);
+  if (this->looked >= 0)
+    status = tal_inspect_energy(this->sim, &before, &this->row, err);
+  this->looked = this->sim->run.step;
+  return status;
 }
 
 // Books the time since the last call on the stage.
@@ -169,8 +179,9 @@ static double phi_now(const job *this) {
 }
 
 static tal_status write_row(job *this, bool fields, tal_error *err) {
-  tal_status status;
-  tal_sim_row(this->sim, &this->row);
+  tal_status status = inspect(this, err);
+  if (status)
+    return status;
   this->phi = fmax(this->phi, phi_now(this));
   if ((status = tal_output_row(this->output, &this->row, err)))
     return status;
@@ -186,9 +197,7 @@ static tal_status write_row(job *this, bool fields, tal_error *err) {
 static tal_status observe(job *this, tal_error *err) {
   const tal_scene_output *plan = &this->scene->output;
   bool fields = due(this->sim, plan->fields_every), row = fields || due(this->sim, plan->series_every);
-  tal_status status = row ? inspect(this, err) : TAL_OK;
-  if (status == TAL_OK && row)
-    status = write_row(this, fields, err);
+  tal_status status = row ? write_row(this, fields, err) : TAL_OK;
   if (status)
     return status;
   int64_t steps = cadence(plan->checkpoint_every, this->sim);
@@ -271,7 +280,9 @@ static void fill_result(const job *this, tal_run_result *result) {
 static tal_status run_opened(job *this, const tal_run_options *options, tal_run_result *result, tal_error *err) {
   tal_status status = TAL_OK;
   begin_accounts(this);
-  if (!options->resume && (status = write_row(this, true, err)) == TAL_OK)
+  if (options->resume)
+    status = inspect(this, err);
+  else if ((status = write_row(this, true, err)) == TAL_OK)
     status = write_checkpoint(this, err);
   tal_progress_begin(&this->progress, this->sim, options->quiet);
   if (status == TAL_OK)
@@ -321,7 +332,7 @@ tal_status tal_run_from(tal_sim *sim, const char *path, tal_error *err) {
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err) {
   *result = (tal_run_result){0};
-  job run = {.scene = scene, .checkpoint = options->resume};
+  job run = {.scene = scene, .checkpoint = options->resume, .looked = -1};
   tal_status status = tal_sim_create(&run.sim, scene, err);
   if (status == TAL_OK)
     status = tal_output_check_tracks(scene, run.sim->grains.count, err);

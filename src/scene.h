@@ -173,9 +173,12 @@ typedef struct tal_scene {
   size_t wall_count;
   tal_scene_pack pack;
   tal_scene_continuum continuum;
-  double skin;          // neighbours.skin [mean diameters]
-  double overlap_limit; // limits.overlap [smaller radius]: beyond it the run stops
-  double outside_limit; // limits.outside [grains]: with more of them outside a minimal boundary the run stops
+  double skin;           // neighbours.skin [mean diameters]
+  double overlap_limit;  // limits.overlap [smaller radius]: beyond it the run stops
+  double stride_limit;   // limits.stride [smallest radius]: a grain that moves further in one step stops the run
+  double world_limit;    // limits.world [mean diameters from the origin]: a grain beyond stops the run
+  double residual_limit; // limits.residual: a jump of the ledger by a larger share stops the run
+  double outside_limit;  // limits.outside [grains]: with more of them outside a minimal boundary the run stops
   tal_scene_integrator integrator;
   tal_scene_stage *stages; // owned
   size_t stage_count;

@@ -207,6 +207,12 @@ static const tal_key limits_keys[] = {
      .help = "a deeper contact stops the run as invalid (exit 3), the last good checkpoint is kept"},
     {KEY("outside", REAL), .unit = "grains", .fallback = "0.05", FROM(0, 1), AT(tal_scene, outside_limit),
      .help = "a larger share of the grains outside a minimal boundary's loop stops the run as invalid"},
+    {KEY("stride", REAL), .unit = "smallest radius", .fallback = "0.5", POSITIVE, .infinite = true,
+     AT(tal_scene, stride_limit), .help = "a grain that moves further in one step stops the run as invalid"},
+    {KEY("world", REAL), .unit = "mean diameters", .fallback = "1e7", POSITIVE, .infinite = true,
+     AT(tal_scene, world_limit), .help = "a grain further than this from the origin stops the run as invalid"},
+    {KEY("residual", REAL), .fallback = "0.1", POSITIVE, .infinite = true, AT(tal_scene, residual_limit),
+     .help = "a larger jump of the energy ledger between two rows, as a share of all energy, stops the run as invalid"},
     {.name = NULL}};
 
 static const tal_key integrator_keys[] = {

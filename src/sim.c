@@ -8,11 +8,13 @@
 #include "energy.h"
 #include "forced.h"
 #include "forces.h"
+#include "inspect.h"
 #include "integrate.h"
 #include "order.h"
 #include "stage.h"
 #include "step.h"
 
+#include <gsl/gsl_statistics_double.h>
 #include <stdlib.h>
 
 static double mean(const double *value, size_t count) {
@@ -71,6 +73,7 @@ static tal_status make_grains(tal_sim *sim, tal_error *err) {
   if (status)
     return status;
   sim->constants.mean_radius = mean(packing.r, packing.count);
+  sim->constants.least_radius = gsl_stats_min(packing.r, 1, packing.count);
   sim->constants.thickness = isnan(scene->grains.thickness) ? 2 * sim->constants.mean_radius : scene->grains.thickness;
   tal_packing_grains(&packing, scene, sim->constants.thickness, &sim->grains);
   tal_order_grains(&sim->grains);
@@ -155,7 +158,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   sim->run.elastic0 = tal_energy_elastic(sim);
   sim->run.gravity0 = tal_energy_gravity(&sim->grains, scene->gravity);
   sim->run.rest = (double)INFINITY;
-  status = tal_step_inspect(sim, err);
+  status = tal_inspect(sim, err);
   if (status == TAL_OK && scene->stage_count)
     status = tal_step_begin_stage(sim, err);
   if (status) {

@@ -150,6 +150,7 @@ typedef struct tal_stage tal_stage;
 // Constants derived once from scene and packing.
 typedef struct tal_constants {
   double mean_radius;      // [m] of the grains
+  double least_radius;     // [m] of the smallest grain
   double mean_mass;        // [kg] scaling included
   double thickness;        // [m]
   double vR;               // [m/s] NAN when no law needs it and no stage gives it

@@ -2,12 +2,12 @@
 #include "step.h"
 
 #include "boundary.h"
-#include "critical.h"
 #include "damping.h"
 #include "effects.h"
 #include "energy.h"
 #include "forced.h"
 #include "forces.h"
+#include "inspect.h"
 #include "integrate.h"
 #include "law.h"
 #include "plates.h"
@@ -114,24 +114,6 @@ double tal_step_longest(const tal_sim *sim) {
   return (double)tal_integrate_longest(plan) * plan->dt;
 }
 
-static tal_status check_step(const tal_sim *sim, tal_error *err) {
-  if (sim->boundary && sim->boundary->check) {
-    tal_status status = sim->boundary->check(sim, err);
-    if (status)
-      return status;
-  }
-  const tal_scene_stage *plan = tal_sim_stage(sim);
-  double critical = tal_critical_step(sim);
-  double longest = tal_step_longest(sim);
-  if (plan->integrator.force || longest <= critical)
-    return TAL_OK;
-  return tal_fail(err, TAL_INVALID,
-                  "integrator.%s = %g s is above the critical step %.4g s of the contacts at t = %g s (stage %d, %s); "
-                  "a smaller dt, or integrator.force: true at your own risk",
-                  longest > plan->integrator.dt ? "n dt" : "dt", longest, critical, sim->run.time, (int)sim->run.stage,
-                  plan->kind);
-}
-
 // Asks the stage whether it is over; the last instant of a stage counts half in the ledger.
 static tal_status look_for_end(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   tal_status status = sim->stage->after_step(sim, plan, err);
@@ -177,9 +159,9 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   tal_energy_credit(sim, 0.5 * sim->dt);
   drive_with_observed(sim);
   run->force_evaluations++;
-  if ((status = tal_step_inspect(sim, err)))
+  if ((status = tal_inspect(sim, err)))
     return status;
-  if ((status = check_step(sim, err)))
+  if ((status = tal_inspect_step(sim, err)))
     return status;
   return look_for_end(sim, plan, err);
 }
@@ -246,31 +228,6 @@ static bool refresh_due(const tal_sim *sim) {
   return largest_displacement(sim) >= limit * diameter;
 }
 
-tal_status tal_step_inspect(const tal_sim *sim, tal_error *err) {
-  const tal_grains *g = &sim->grains;
-  for (size_t i = 0; i < g->count; i++)
-    if (!(fabs(g->x[i]) < 1e150 && fabs(g->y[i]) < 1e150 && fabs(g->vx[i]) < 1e150 && fabs(g->vy[i]) < 1e150 &&
-          fabs(g->omega[i]) < 1e150))
-      return tal_fail(err, TAL_INVALID,
-                      "grain %lld has no finite position or velocity at t = %g s; the time step is probably too large",
-                      (long long)g->id[i], sim->run.time);
-  int64_t grain;
-  double overlap = tal_largest_overlap(sim, &grain);
-  if (overlap > sim->scene->overlap_limit)
-    return tal_fail(err, TAL_INVALID,
-                    "grain %lld overlaps by %.3g of the smaller radius at t = %g s (limits.overlap: %g); contacts too "
-                    "soft, a step too large or an impact too fast",
-                    (long long)grain, overlap, sim->run.time, sim->scene->overlap_limit);
-  for (int side = 1; side >= -1; side -= 2) {
-    const tal_wall *plate = tal_walls_plate(&sim->walls, side);
-    for (size_t i = 0; plate && i < g->count; i++)
-      if (side * (g->y[i] - plate->y0) < -g->r[i])
-        return tal_fail(err, TAL_INVALID, "grain %lld was lost through a plate at t = %g s", (long long)g->id[i],
-                        sim->run.time);
-  }
-  return TAL_OK;
-}
-
 // Passes over finished stages; false with TAL_OK when all are done.
 static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
   *more = false;
@@ -304,10 +261,12 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   tal_integrator_find(plan->integrator.scheme)->advance(sim); // (12)-(17)
   sim->dt = sim->dt_next;
   run->force_evaluations++;
+  if ((status = tal_inspect_stride(sim, err)))
+    return status;
   if (run->step / INSPECT_EVERY != before / INSPECT_EVERY) {
-    if ((status = tal_step_inspect(sim, err)))
+    if ((status = tal_inspect(sim, err)))
       return status;
-    if ((status = check_step(sim, err)))
+    if ((status = tal_inspect_step(sim, err)))
       return status;
   }
   if (tal_step_keeps_graph(sim) && refresh_due(sim) && (status = tal_step_refresh(sim, err)))

@@ -18,8 +18,5 @@ double tal_step_longest(const tal_sim *sim);
 tal_status tal_step_refresh(tal_sim *sim, tal_error *err);
 // Friction between plates and grains that the stage asks for.
 double tal_step_plate_friction(const tal_sim *sim, const tal_scene_stage *plan);
-// Looks for a run gone bad: coordinates that are no numbers, overlaps beyond the limit, lost grains, a step above the
-// critical one.
-tal_status tal_step_inspect(const tal_sim *sim, tal_error *err);
 
 #endif

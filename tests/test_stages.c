@@ -8,6 +8,7 @@
 
 #include "checkpoint.h"
 #include "engine.h"
+#include "inspect.h"
 #include "run.h"
 #include "small_run.h"
 #include "step.h"
@@ -251,7 +252,7 @@ static void assert_good_checkpoint(const folder *f, const char *path) {
   char *text = tal_scene_text(&scene);
   assert_int_equal(tal_checkpoint_read(path, sim, text, &files, &err), TAL_OK);
   tal_sim_restored(sim);
-  assert_int_equal(tal_step_inspect(sim, &err), TAL_OK);
+  assert_int_equal(tal_inspect(sim, &err), TAL_OK);
   assert_true(sim->run.step > 0 && !tal_sim_done(sim));
   free(text);
   tal_run_files_clear(&files);
@@ -298,8 +299,9 @@ static void invalid_runs(void **state) {
                        "mass_scaling: 1e-2\n"
                        "stages: [{kind: free, duration: 9}]\noutput: {checkpoint_every: 0.1, series_every: 0.1}\n",
                  "is above the critical step");
-  assert_invalid(FLIGHT "gravity: [1e150, 0]\nstages: [{kind: free, duration: 9}]\n"
-                        "output: {checkpoint_every: 0.1, series_every: 0.1}\n",
+  assert_invalid(FLIGHT
+                 "gravity: [1e150, 0]\nlimits: {stride: .inf, world: .inf}\nstages: [{kind: free, duration: 9}]\n"
+                 "output: {checkpoint_every: 0.1, series_every: 0.1}\n",
                  "no finite position or velocity");
 }
 
