@@ -79,7 +79,8 @@ static double stiffness_at(const tal_sim *sim, double load) {
     return sim->scene->contact.stiffness;
   const tal_constants *k = &sim->constants;
   double stiffness = tal_hertz_stiffness(k->modulus, k->modulus, k->mean_radius);
-  return tal_hertz_slope(stiffness, cbrt(load / stiffness));
+  const double root = sqrt(k->mean_radius); // the cube root of a ratio: the same digits in any unit of length
+  return tal_hertz_slope(stiffness, root * cbrt(load / (stiffness * k->mean_radius * root)));
 }
 
 // Half the speed at which the grains at the two plates part; their common motion is not the plates' to follow.

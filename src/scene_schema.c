@@ -199,7 +199,7 @@ static const tal_key continuum_keys[] = {
 
 static const tal_key neighbours_keys[] = {
     {KEY("skin", REAL), .unit = "mean diameters", .fallback = "0.02", ABOVE_TO(0, 10), AT(tal_scene, skin),
-     .help = "reach of the neighbour list beyond contact: cost only, no effect on results"},
+     .help = "reach of the neighbour list beyond contact: cost only (implicit_friction: the order of its sweeps too)"},
     {.name = NULL}};
 
 static const tal_key limits_keys[] = {
