@@ -16,7 +16,7 @@
 
 #include <string.h>
 
-// Steps between two looks for a run gone bad.
+// Steps between two looks for a run gone bad, unless grains move fast.
 enum { INSPECT_EVERY = 100 };
 
 static bool any_spin(const tal_grains *g) {
@@ -245,6 +245,12 @@ static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
   return TAL_OK;
 }
 
+// Every so many steps, and before an overlap could have come and gone that is half as deep again as the limit.
+static bool inspection_due(const tal_sim *sim, int64_t before) {
+  return sim->run.step / INSPECT_EVERY != before / INSPECT_EVERY ||
+         sim->neighbours.travelled > 0.25 * sim->scene->overlap_limit * sim->constants.least_radius;
+}
+
 tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   bool more;
   tal_status status = enter_stage(sim, &more, err);
@@ -263,7 +269,8 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   run->force_evaluations++;
   if ((status = tal_inspect_stride(sim, err)))
     return status;
-  if (run->step / INSPECT_EVERY != before / INSPECT_EVERY) {
+  if (inspection_due(sim, before)) {
+    sim->neighbours.travelled = 0;
     if ((status = tal_inspect(sim, err)))
       return status;
     if ((status = tal_inspect_step(sim, err)))
