@@ -271,7 +271,6 @@ bool tal_neighbours_stale(tal_sim *sim, double step) {
   tal_neighbours *n = &sim->neighbours;
   const double walls = largest_wall_displacement(sim);
   n->stride = step;
-  n->travelled += step;
   if (walls_changed(sim))
     return true;
   n->moved += step;

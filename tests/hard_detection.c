@@ -49,7 +49,7 @@ static const fault faults[] = {
     {"outside the world",
      "a grain in free flight",
      FLIGHT("90") "limits: {world: 100}\noutput: {series_every: 0.1, checkpoint_every: 0.1}\n",
-     {"grain 1 is outside the world at t = 2.3", "(limits.world)", "it flew away", "put walls around it"},
+     {"grain 1 is outside the world at t = 2.2", "(limits.world)", "it flew away", "put walls around it"},
      "1e7 mean diameters (here 100)"},
     {"overlap",
      "a wall that presses three grains",

@@ -65,7 +65,7 @@ static void test_below(void **state) {
 }
 
 static int64_t growth_steps(void) {
-  return hard_size(4000, 40000, 400000);
+  return hard_size(4000, 20000, 400000);
 }
 
 // Does the swing grow within some thousand steps?
@@ -158,7 +158,7 @@ typedef struct ending {
 
 static ending bed_runs(program *p, const char *scheme, double dt, bool force) {
   char text[2000], dir[60], series[80];
-  const double steps = (double)hard_size(2000, 20000, 200000);
+  const double steps = (double)hard_size(2000, 5000, 100000);
   outcome got;
   snprintf(text, sizeof text, BED, scheme, dt, force ? ", force: true" : "", steps * dt, 5 * dt);
   program_write(p, "s.yaml", text);
