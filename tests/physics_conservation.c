@@ -129,7 +129,7 @@ static engine *start_mapped(const cloud_grain *g, int count, const char *law, co
             m[2] * p[0] + m[3] * p[1], m[0] * p[2] + m[1] * p[3], m[2] * p[2] + m[3] * p[3], m[0] * p[4] + m[1] * p[5],
             m[2] * p[4] + m[3] * p[5]);
   }
-  fprintf(to, "gravity: [%.17g, %.17g]\n%s", m[0] * 3 + m[1] * -8, m[2] * 3 + m[3] * -8, law);
+  fprintf(to, "gravity: [%.17g, %.17g]\nlimits: {overlap: 0.7}\n%s", m[0] * 3 + m[1] * -8, m[2] * 3 + m[3] * -8, law);
   fclose(to);
   cloud_grain *mapped = tal_alloc((size_t)count, sizeof *mapped);
   for (int k = 0; k < count; k++)
