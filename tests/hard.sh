@@ -2,6 +2,7 @@
 # hard.sh BINARY...   Runs the hard cases and prints their table. The form is that of HARD (plain or long). Exit 1 when a
 # case failed; what it said stands below the table.
 set -u
+export OMP_WAIT_POLICY="${OMP_WAIT_POLICY:-passive}"
 log=$(mktemp)
 trap 'rm -f "$log" "$log.failed"' EXIT
 trap 'exit 130' INT TERM
