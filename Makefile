@@ -20,7 +20,8 @@ export PYTHON ?= /usr/bin/python3
 HAVE_CGAL := $(shell $(CXX) -E -x c++ -include CGAL/version.h /dev/null >/dev/null 2>&1 && echo yes)
 
 # Floating point: the same bits for any number of threads and on any x86-64: no reassociation (-ffast-math never), no
-# fused multiply-add. -fno-math-errno and -fno-trapping-math change no result; they let loops vectorise.
+# multiply-add that the source does not fuse itself. -fno-math-errno and -fno-trapping-math change no result; they let
+# loops vectorise.
 FLOAT    := -ffp-contract=off -fno-math-errno -fno-trapping-math
 native   := -O3 -march=native -g
 debug    := -O0 -g
