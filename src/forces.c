@@ -13,13 +13,11 @@
 #include <omp.h>
 #include <stdlib.h>
 
-// Grains kicked at a time.
-enum { GRAINS = 64 };
+enum { GRAINS = TAL_KICK_GRAINS };
 
 typedef struct range {
   tal_sim *sim;
   tal_sweep sweep;
-  double credit;
   tal_force_record *sum; // ring; grain g at g & mask, zero where no contact has been added
   size_t mask;
   size_t done;    // grains below are dealt with
@@ -91,7 +89,7 @@ static void complete(range *t, size_t end, bool all) {
     tal_force_block sums;
     take_sums(t, t->done, (int)count, &sums);
     if (t->kicks)
-      tal_kick(t->sim, &sums, t->done, (int)count, t->sweep.dt, t->credit);
+      tal_kick(t->sim, &sums, t->done, (int)count, t->sweep.dt);
     t->done += count;
   }
 }
@@ -131,13 +129,13 @@ static void work_off(range *t, size_t last) {
   complete(t, last, true);
 }
 
-static void step_range(tal_sim *sim, tal_sweep sweep, double credit, int part, int parts) {
+static void step_range(tal_sim *sim, tal_sweep sweep, int part, int parts) {
   const size_t ring = sim->neighbours.ring, span = sim->neighbours.span;
   const size_t groups = (sim->grains.count + GRAINS - 1) / GRAINS;
   const size_t first = groups * (size_t)part / (size_t)parts * GRAINS;
   const size_t beyond = groups * (size_t)(part + 1) / (size_t)parts * GRAINS;
   const size_t last = beyond < sim->grains.count ? beyond : sim->grains.count;
-  range t = {.sim = sim, .sweep = sweep, .credit = credit, .sum = sim->sums + (size_t)part * ring, .mask = ring - 1};
+  range t = {.sim = sim, .sweep = sweep, .sum = sim->sums + (size_t)part * ring, .mask = ring - 1};
   t.done = t.fetched = first > span ? first - span : 0;
   t.sweep.moves = false;
   work_off(&t, first);
@@ -176,5 +174,6 @@ void tal_forces_step(tal_sim *sim, double dt, double credit) {
   tal_forces_sweep_walls(sim, dt);
   tal_forces_forget(sim);
 #pragma omp parallel num_threads(threads) if (threads > 1)
-  step_range(sim, sweep, credit, omp_get_thread_num(), omp_get_num_threads());
+  step_range(sim, sweep, omp_get_thread_num(), omp_get_num_threads());
+  tal_kick_book(sim, credit);
 }

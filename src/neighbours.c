@@ -2,7 +2,7 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
-#include "contact_block.h"
+#include "kick.h"
 #include "damping.h"
 #include "law.h"
 #include "sim.h"
@@ -204,6 +204,8 @@ static void list_all(tal_sim *sim) {
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
     free(sim->grain_records);
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
+    free(sim->powers);
+    sim->powers = tal_alloc(g->count / TAL_KICK_GRAINS + 1, sizeof *sim->powers);
     n->grain_capacity = g->count;
   }
   tal_implicit_save(sim);

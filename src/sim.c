@@ -180,6 +180,7 @@ void tal_sim_free(tal_sim *sim) {
   free(sim->grain_records);
   free(sim->force_records);
   free(sim->sums);
+  free(sim->powers);
   tal_graph_clear(&sim->graph);
   free(sim);
 }
