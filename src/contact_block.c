@@ -3,6 +3,8 @@
 // root is a chain of operations as long as all the rest, is put on by two more.
 #include "contact_block.h"
 
+#include "damping.h"
+
 // What a block of contacts brings; one array per quantity.
 typedef struct meetings {
   double dx[TAL_BLOCK], dy[TAL_BLOCK]; // centre i - centre j
@@ -25,9 +27,7 @@ tal_sweep tal_sweep_of(const tal_sim *sim, double dt) {
                      .moves = dt > 0,
                      .law = sim->effects & TAL_EFFECT_LAW,
                      .friction = sim->friction,
-                     .damping_time = sim->effects & TAL_EFFECT_HERTZ && isnan(sim->constants.damping_number)
-                                         ? sim->scene->material.damping
-                                         : (double)NAN,
+                     .damping_time = tal_damping_time_of_slots(sim),
                      .constants = {.inverse_vR = 1 / sim->constants.vR,
                                    .inverse_exponent = 1 / law->exponent,
                                    .tangential_ratio = sim->constants.tangential_ratio}};
@@ -106,7 +106,7 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   const double *restrict hx = b->hx, *restrict hy = b->hy, *restrict spins = b->spins, *restrict speeds = b->speeds;
   const double *restrict reach = slots->reach + start, *restrict stiffness = slots->stiffness + start;
   // one time for all contacts, as a scene with `damping` has it, saves an array
-  const bool own = isnan(sweep->damping_time);
+  const bool own = slots->damping != NULL;
   const double *restrict viscous = (own ? slots->damping : slots->stiffness) + start;
   const double damping_scale = own ? 1 : sweep->damping_time;
   double unused[2][TAL_BLOCK]; // where histories go that are not to move
