@@ -8,6 +8,7 @@
 #include "energy.h"
 #include "forced.h"
 #include "forces.h"
+#include "hot.h"
 #include "integrate.h"
 #include "order.h"
 #include "stage.h"
@@ -133,6 +134,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   *out = NULL;
   tal_sim *sim = tal_alloc(1, sizeof *sim);
   sim->scene = scene;
+  sim->hot = tal_hot_best();
   tal_status status = make_grains(sim, err);
   if (status) {
     tal_sim_free(sim);

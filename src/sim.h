@@ -147,6 +147,7 @@ typedef struct tal_sim tal_sim;
 typedef struct tal_law tal_law;
 typedef struct tal_integrator tal_integrator;
 typedef struct tal_boundary tal_boundary;
+typedef struct tal_hot tal_hot;
 typedef struct tal_stage tal_stage;
 
 // Constants derived once from scene and packing.
@@ -164,6 +165,7 @@ typedef struct tal_constants {
 
 struct tal_sim {
   const tal_scene *scene; // borrowed
+  const tal_hot *hot; // the hot loops for this processor
   tal_constants constants;
   tal_grains grains;
   tal_contacts pairs;         // grain-grain slots
