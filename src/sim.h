@@ -165,7 +165,7 @@ typedef struct tal_constants {
 
 struct tal_sim {
   const tal_scene *scene; // borrowed
-  const tal_hot *hot; // the hot loops for this processor
+  const tal_hot *hot;     // the hot loops for this processor
   tal_constants constants;
   tal_grains grains;
   tal_contacts pairs;         // grain-grain slots
