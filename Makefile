@@ -20,7 +20,8 @@ export PYTHON ?= /usr/bin/python3
 HAVE_CGAL := $(shell $(CXX) -E -x c++ -include CGAL/version.h /dev/null >/dev/null 2>&1 && echo yes)
 
 # Floating point: the same bits for any number of threads and on any x86-64: no reassociation (-ffast-math never), no
-# fused multiply-add. -fno-math-errno and -fno-trapping-math change no result; they let loops vectorise.
+# multiply-add that the source does not fuse itself. -fno-math-errno and -fno-trapping-math change no result; they let
+# loops vectorise.
 FLOAT    := -ffp-contract=off -fno-math-errno -fno-trapping-math
 native   := -O3 -march=native -g
 # What valgrind knows.
@@ -28,10 +29,16 @@ costs    := -O3 -march=x86-64-v3 -g
 debug    := -O0 -g
 asan     := -O1 -g -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined
 tsan     := -O1 -g -fsanitize=thread
+# The hot loops, compiled once more for each width of vectors; a run takes the widest that its processor has (src/hot.h).
+HOT      := $(addprefix src/,contact_block kick forces_range drift implicit_block)
+WIDTHS   := $(if $(findstring x86_64,$(shell $(CC) -dumpmachine)),v3 v4)
+width_v3 := -march=x86-64-v3
+width_v4 := -march=x86-64-v4 -mprefer-vector-width=512
 # -Wno-pass-failed: that clang leaves a loop marked simd scalar is a matter of speed alone.
 WARN     := -Wall -Wextra -Wvla $(if $(CLANG),-Wno-pass-failed)
 WARN_C   := $(WARN) -Wshadow -Wdouble-promotion -Wstrict-prototypes -Wmissing-prototypes
-DEFINE   := -D_GNU_SOURCE -DTAL_VERSION=\"$(VERSION)\" $(if $(HAVE_CGAL),-DTAL_HAVE_CGAL)
+DEFINE   := -D_GNU_SOURCE -DTAL_VERSION=\"$(VERSION)\" $(if $(HAVE_CGAL),-DTAL_HAVE_CGAL) \
+  $(if $(WIDTHS),-DTAL_HAVE_WIDTHS)
 SYSTEM   := $(shell pkg-config --cflags $(PACKAGES) 2>/dev/null)
 COMMON   := -fopenmp -fPIC -Igeom -Isrc $(DEFINE)
 CFLAGS   := -std=gnu17 $($(MODE)) $(FLOAT) $(WARN_C) $(COMMON) $(SYSTEM) $(EXTRA)
@@ -45,6 +52,7 @@ PROGRAM  := src/main.c $(wildcard src/cli*.c)
 SOURCES  := $(filter-out $(PROGRAM),$(wildcard geom/*.c src/*.c)) $(if $(HAVE_CGAL),geom/delaunay_cgal.cpp)
 HEADERS  := $(wildcard geom/*.h src/*.h)
 objects   = $(addprefix $(OUT)/,$(addsuffix .o,$(basename $(1))))
+library  := $(call objects,$(SOURCES)) $(foreach w,$(WIDTHS),$(HOT:%=$(OUT)/%.$(w).o))
 TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
@@ -58,15 +66,21 @@ all: $(OUT)/talus $(OUT)/libtalus.so
 
 $(OUT)/talus: $(call objects,$(PROGRAM)) $(OUT)/libtalus.a
 	$(CC) $(LDFLAGS) -o $@ $^ $(LDLIBS)
-$(OUT)/libtalus.a: $(call objects,$(SOURCES))
+$(OUT)/libtalus.a: $(library)
 	rm -f $@ && ar rcs $@ $^
-$(OUT)/libtalus.so: $(call objects,$(SOURCES))
+$(OUT)/libtalus.so: $(library)
 	$(CC) $(LDFLAGS) -shared -Wl,-soname,$(@F) -o $@ $^ $(LDLIBS)
 $(OUT)/tests/%: $(OUT)/tests/%.o $(OUT)/libtalus.a
 	$(CC) $(LDFLAGS) -o $@ $^ -lcmocka $(LDLIBS)
 $(OUT)/%.o: %.c $(OUT)/flags
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS) -MMD -MP -c -o $@ $<
+define WIDTH_RULE
+$(OUT)/%.$(1).o: %.c $(OUT)/flags
+	@mkdir -p $$(@D)
+	$(CC) $(CFLAGS) $(width_$(1)) -DTAL_WIDTH=$(1) -include src/width.h -MMD -MP -c -o $$@ $$<
+endef
+$(foreach w,$(WIDTHS),$(eval $(call WIDTH_RULE,$(w))))
 $(OUT)/%.o: %.cpp $(OUT)/flags
 	@mkdir -p $(@D)
 	$(CXX) $(CXXFLAGS) -MMD -MP -c -o $@ $<

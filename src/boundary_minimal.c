@@ -202,7 +202,7 @@ static void start(tal_sim *sim) {
     const int32_t i = node[k];
     const double vx = rows->velocity[2 * k], vy = rows->velocity[2 * k + 1];
     double work = 0.5 * g->mass[i] * ((vx - g->vx[i]) * (vx + g->vx[i]) + (vy - g->vy[i]) * (vy + g->vy[i]));
-    g->boundary_work[i] += work;
+    sim->run.boundary_work += work;
     sim->run.correcting_work += work;
     g->vx[i] = vx;
     g->vy[i] = vy;

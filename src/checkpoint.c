@@ -13,7 +13,9 @@
 // A field list's `kept` chooses between these.
 #define IF_STATE(...) __VA_ARGS__
 #define IF_WORK(...)
-#define IF_PAST(...) __VA_ARGS__
+#define IF_PAST(...)   __VA_ARGS__
+#define IF_SOLVED(...) __VA_ARGS__
+#define IF_DAMPED(...)
 #define IF_SEEN(...)
 #define IF_WALL(...)
 #define PUT_int64_t tal_store_put_integer

@@ -6,7 +6,7 @@
 #include "sim.h"
 
 // Bumped when a field list or the layout changes its meaning.
-#define TAL_CHECKPOINT_FORMAT 3
+#define TAL_CHECKPOINT_FORMAT 4
 
 // What the files of a run hold at the instant of a checkpoint: X(type, name, unit, meaning).
 #define TAL_RUN_FILES_FIELDS(X)                                                                                        \

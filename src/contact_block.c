@@ -1,6 +1,9 @@
-// A block goes through two loops: one fetches the records of the grains, four contacts at a time, and turns them into
-// arrays; one, a vector loop, works out geometry and law with selects in place of branches.
+// A block goes through loops of its own: one fetches the records of the grains, four contacts at a time, and turns them
+// into arrays; a vector loop works out geometry and law with selects in place of branches; regularised friction, whose
+// root is a chain of operations as long as all the rest, is put on by two more.
 #include "contact_block.h"
+
+#include "damping.h"
 
 // What a block of contacts brings; one array per quantity.
 typedef struct meetings {
@@ -11,15 +14,20 @@ typedef struct meetings {
   double speeds[TAL_BLOCK];            // sum of radius times spin
 } __attribute__((aligned(64))) meetings;
 
+// What regularised friction still has to know of them.
+typedef struct rubbing {
+  double x[TAL_BLOCK], y[TAL_BLOCK]; // normal into i
+  double half_overlap[TAL_BLOCK], cap[TAL_BLOCK], slip[TAL_BLOCK];
+  double begun[TAL_BLOCK]; // first half of the root
+} __attribute__((aligned(64))) rubbing;
+
 tal_sweep tal_sweep_of(const tal_sim *sim, double dt) {
   const tal_scene_contact *law = &sim->scene->contact;
   return (tal_sweep){.dt = dt,
                      .moves = dt > 0,
                      .law = sim->effects & TAL_EFFECT_LAW,
                      .friction = sim->friction,
-                     .damping_time = sim->effects & TAL_EFFECT_HERTZ && isnan(sim->constants.damping_number)
-                                         ? sim->scene->material.damping
-                                         : (double)NAN,
+                     .damping_time = tal_damping_time_of_slots(sim),
                      .constants = {.inverse_vR = 1 / sim->constants.vR,
                                    .inverse_exponent = 1 / law->exponent,
                                    .tangential_ratio = sim->constants.tangential_ratio}};
@@ -73,13 +81,32 @@ TAL_KERNEL void fetch(meetings *b, const tal_sim *sim, size_t start, int count, 
   }
 }
 
+TAL_KERNEL void rub(rubbing *r, const tal_sweep *sweep, int count, tal_force_block *out) {
+  const double *restrict x = r->x, *restrict y = r->y, *restrict slip = r->slip, *restrict cap = r->cap;
+  const double *restrict half_overlap = r->half_overlap;
+  double *restrict begun = r->begun, *restrict tx = out->force[4], *restrict ty = out->force[5];
+  double *restrict ft = out->force[6], *restrict fh = out->force[7];
+  const double inverse_vR = sweep->constants.inverse_vR, inverse_exponent = sweep->constants.inverse_exponent;
+#pragma omp simd
+  for (int k = 0; k < count; k++)
+    begun[k] = tal_root_begin(fabs(slip[k]) * inverse_vR, inverse_exponent);
+#pragma omp simd
+  for (int k = 0; k < count; k++) {
+    double f = tal_regularised_force(cap[k], tal_root_end(fabs(slip[k]) * inverse_vR, begun[k]), slip[k]);
+    tx[k] = -f * y[k];
+    ty[k] = f * x[k];
+    ft[k] = f;
+    fh[k] = f * half_overlap[k];
+  }
+}
+
 TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep *sweep, size_t start, int count,
                          tal_force_block *out, unsigned effects) {
   const double *restrict dx = b->dx, *restrict dy = b->dy, *restrict ux = b->ux, *restrict uy = b->uy;
   const double *restrict hx = b->hx, *restrict hy = b->hy, *restrict spins = b->spins, *restrict speeds = b->speeds;
   const double *restrict reach = slots->reach + start, *restrict stiffness = slots->stiffness + start;
   // one time for all contacts, as a scene with `damping` has it, saves an array
-  const bool own = isnan(sweep->damping_time);
+  const bool own = slots->damping != NULL;
   const double *restrict viscous = (own ? slots->damping : slots->stiffness) + start;
   const double damping_scale = own ? 1 : sweep->damping_time;
   double unused[2][TAL_BLOCK]; // where histories go that are not to move
@@ -93,6 +120,8 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   double *restrict ft = out->force[6], *restrict fh = out->force[7];
   const tal_law_constants constants = sweep->constants;
   const double friction = sweep->friction, dt = sweep->dt;
+  const unsigned at_once = effects & ~(unsigned)TAL_EFFECT_REGULARISED;
+  rubbing r;
 #pragma omp simd
   for (int k = 0; k < count; k++) {
     double distance = sqrt(dx[k] * dx[k] + dy[k] * dy[k]);
@@ -104,29 +133,34 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
       m.damping = damping_scale * viscous[k];
       m.approach = -(x * ux[k] + y * uy[k]);
     }
-    if (effects & TAL_EFFECT_REGULARISED)
-      m.slip = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
     if (effects & TAL_EFFECT_SPRING) {
       m.slip_distance = dt * tal_slip_speed(x, y, hx[k], hy[k], half_overlap, speeds[k], spins[k], effects);
       m.spring = spring[k];
       m.spring_stiffness = spring_stiffness[k];
     }
-    tal_law_force f = tal_contact_law(m, constants, effects);
+    tal_law_force f = tal_contact_law(m, constants, at_once);
     ex[k] = f.fe * x;
     ey[k] = f.fe * y;
     vx[k] = effects & TAL_EFFECT_DAMPING ? f.fd * x : 0;
     vy[k] = effects & TAL_EFFECT_DAMPING ? f.fd * y : 0;
-    if (effects & TAL_EFFECT_FRICTION) {
+    if (effects & TAL_EFFECT_REGULARISED) {
+      r.x[k] = x;
+      r.y[k] = y;
+      r.half_overlap[k] = half_overlap;
+      r.cap[k] = f.cap;
+      r.slip[k] = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
+    }
+    if (effects & TAL_EFFECT_SPRING) {
       tx[k] = -f.ft * y;
       ty[k] = f.ft * x;
       ft[k] = f.ft;
       fh[k] = f.ft * half_overlap;
-    }
-    if (effects & TAL_EFFECT_SPRING) {
       new_spring[k] = f.ft;
       new_spring_stiffness[k] = f.spring_stiffness;
     }
   }
+  if (effects & TAL_EFFECT_REGULARISED)
+    rub(&r, sweep, count, out);
 }
 
 TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out,

@@ -8,7 +8,7 @@
 #include "sim.h"
 
 // Slots taken at a time.
-enum { TAL_BLOCK = 128 };
+enum { TAL_BLOCK = 64 };
 
 // Members of tal_force_record, one array each.
 typedef struct tal_force_block {

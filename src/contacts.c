@@ -29,16 +29,22 @@ void tal_contacts_swap(tal_contacts *a, tal_contacts *b) {
   *b = held;
 }
 
-#define IF_STATE(past, ...) __VA_ARGS__
-#define IF_WORK(past, ...)  __VA_ARGS__
-#define IF_PAST(past, ...)                                                                                             \
-  if (past)                                                                                                            \
+#define IF_STATE(...) __VA_ARGS__
+#define IF_WORK(...)  __VA_ARGS__
+#define IF_PAST(...)                                                                                                   \
+  if (needs.past)                                                                                                      \
+  __VA_ARGS__
+#define IF_SOLVED(...)                                                                                                 \
+  if (needs.solved)                                                                                                    \
+  __VA_ARGS__
+#define IF_DAMPED(...)                                                                                                 \
+  if (needs.damped)                                                                                                    \
   __VA_ARGS__
 #define IF_SEEN(...)
 #define IF_WALL(...)
 
-void tal_contacts_reserve_pairs(tal_contacts *contacts, size_t capacity, bool past) {
-#define X(type, name, unit, kept, meaning) IF_##kept(past, contacts->name = tal_alloc(capacity, sizeof(type));)
+void tal_contacts_reserve_pairs(tal_contacts *contacts, size_t capacity, tal_contact_needs needs) {
+#define X(type, name, unit, kept, meaning) IF_##kept(contacts->name = tal_alloc(capacity, sizeof(type));)
   TAL_CONTACT_FIELDS(X)
 #undef X
   contacts->capacity = capacity;
@@ -47,10 +53,14 @@ void tal_contacts_reserve_pairs(tal_contacts *contacts, size_t capacity, bool pa
 #undef IF_STATE
 #undef IF_WORK
 #undef IF_PAST
+#undef IF_SOLVED
+#undef IF_DAMPED
 #undef IF_SEEN
 #define IF_STATE(...)
 #define IF_WORK(...)
 #define IF_PAST(...)
+#define IF_SOLVED(...)
+#define IF_DAMPED(...)
 #define IF_SEEN(...) __VA_ARGS__
 
 void tal_contacts_show(tal_contacts *contacts) {

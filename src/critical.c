@@ -32,9 +32,9 @@ static double pair_overlap(const tal_sim *sim, size_t c) {
 // Tangent stiffness and damping of a touching slot.
 static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double overlap, double *stiffness,
                         double *damping) {
-  double root = sqrt(overlap);
+  const double root = sqrt(overlap), own = tal_damping_of_slot(sim, s, c);
   *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
-  *damping = sim->effects & TAL_EFFECT_HERTZ ? s->damping[c] * root : s->damping[c];
+  *damping = sim->effects & TAL_EFFECT_HERTZ ? own * root : own;
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     *damping = 0; // solved, and stable for any step
 }

@@ -31,6 +31,17 @@ double tal_damping_coefficient(const tal_scene *scene, const tal_constants *cons
   return isnan(number) ? scene->contact.damping : 2 * number * sqrt(stiffness * reduced_mass);
 }
 
+double tal_damping_time_of_slots(const tal_sim *sim) {
+  const bool one = sim->effects & TAL_EFFECT_HERTZ && isnan(sim->constants.damping_number);
+  return one ? sim->scene->material.damping : (double)NAN;
+}
+
+double tal_damping_of_slot(const tal_sim *sim, const tal_contacts *slots, size_t c) {
+  if (slots->damping)
+    return slots->damping[c];
+  return sim->effects & TAL_EFFECT_DAMPING ? tal_damping_time_of_slots(sim) * slots->stiffness[c] : 0;
+}
+
 tal_pair tal_damping_mean_pair(const tal_scene *scene, const tal_constants *constants) {
   tal_pair pair = {.reduced_mass = constants->mean_mass / 2};
   bool hertz = is_hertz(scene);

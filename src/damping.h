@@ -17,6 +17,11 @@ bool tal_damping_any(const tal_scene *scene);
 double tal_damping_coefficient(const tal_scene *scene, const tal_constants *constants, double stiffness,
                                double reduced_mass);
 
+// The one damping over stiffness [s] of all slots; NAN where each has its own.
+double tal_damping_time_of_slots(const tal_sim *sim);
+// Damping of one slot: its own where the list keeps one.
+double tal_damping_of_slot(const tal_sim *sim, const tal_contacts *slots, size_t c);
+
 // A contact as the impact toolbox sees it.
 typedef struct tal_pair {
   double stiffness;    // K [N/m^1.5] or k [N/m]

@@ -75,15 +75,24 @@ static power grain_power(const tal_sim *sim, size_t i) {
   return p;
 }
 
-void tal_energy_credit(tal_sim *sim, double weight) {
-  tal_grains *g = &sim->grains;
-  for (size_t i = 0; i < g->count; i++) {
+static power total_power(const tal_sim *sim) {
+  power sum = {0, 0, 0, 0};
+  for (size_t i = 0; i < sim->grains.count; i++) {
     power p = grain_power(sim, i);
-    g->friction_work[i] += weight * p.friction;
-    g->damping_work[i] += weight * p.damping;
-    g->boundary_work[i] += weight * p.boundary;
-    g->held_work[i] += weight * p.held;
+    sum.friction += p.friction;
+    sum.damping += p.damping;
+    sum.boundary += p.boundary;
+    sum.held += p.held;
   }
+  return sum;
+}
+
+void tal_energy_credit(tal_sim *sim, double weight) {
+  const power p = total_power(sim);
+  sim->run.friction_work += weight * p.friction;
+  sim->run.damping_work += weight * p.damping;
+  sim->run.boundary_work += weight * p.boundary;
+  sim->run.held_work += weight * p.held;
   sim->run.correcting_work += weight * sim->run.correcting_power;
   tal_membrane_credit(sim, weight);
 }
@@ -95,17 +104,11 @@ static double last_half(const tal_sim *sim) {
 
 // Accounts of the grains with the last instant counted half.
 static power grain_works(const tal_sim *sim) {
-  const tal_grains *g = &sim->grains;
-  power sum = {.friction = sim->run.friction_work, .damping = sim->run.damping_work};
-  double half = last_half(sim);
-  for (size_t i = 0; i < g->count; i++) {
-    power p = grain_power(sim, i);
-    sum.friction += g->friction_work[i] - half * p.friction;
-    sum.damping += g->damping_work[i] - half * p.damping;
-    sum.boundary += g->boundary_work[i] - half * p.boundary;
-    sum.held += g->held_work[i] - half * p.held;
-  }
-  return sum;
+  const tal_run *run = &sim->run;
+  const power p = total_power(sim);
+  const double half = last_half(sim);
+  return (power){run->friction_work - half * p.friction, run->damping_work - half * p.damping,
+                 run->boundary_work - half * p.boundary, run->held_work - half * p.held};
 }
 
 // What goes through a membrane, with the last instant counted half.

@@ -154,7 +154,7 @@ void tal_forced_take(tal_sim *sim, size_t index) {
   tal_grains *g = &sim->grains;
   sim->run.forced = (int64_t)index + 1;
   g->inverse_inertia[index] = 0;
-  g->held_work[index] -= 0.5 * g->inertia[index] * g->omega[index] * g->omega[index];
+  sim->run.held_work -= 0.5 * g->inertia[index] * g->omega[index] * g->omega[index];
   g->omega[index] = 0;
   g->torque[index] = 0;
 }
@@ -171,7 +171,7 @@ void tal_forced_turn(tal_sim *sim, double omega) {
   tal_grains *g = &sim->grains;
   const size_t i = (size_t)sim->run.forced - 1;
   const double before = g->omega[i];
-  g->held_work[i] += 0.5 * g->inertia[i] * (omega - before) * (omega + before);
+  sim->run.held_work += 0.5 * g->inertia[i] * (omega - before) * (omega + before);
   g->theta[i] -= 0.5 * sim->dt * (omega - before); // the step adds dt omega
   g->omega[i] = omega;
 }

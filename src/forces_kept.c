@@ -7,8 +7,7 @@
 
 #include <stdlib.h>
 
-// Grains summed at a time.
-enum { GRAINS = 64, PARALLEL_FROM = 2000 };
+enum { GRAINS = TAL_KICK_GRAINS, PARALLEL_FROM = 2000 };
 
 // ---- sweep ----------------------------------------------------------------------------------------------------------
 
@@ -41,6 +40,7 @@ void tal_forces_forget(tal_sim *sim) {
   sim->force_records = NULL;
   sim->force_capacity = 0;
   tal_contacts_hide(&sim->pairs);
+  tal_grains_hide(&sim->grains);
   tal_neighbours_forget(&sim->neighbours);
   tal_graph_forget_edges(&sim->graph);
 }
@@ -199,6 +199,7 @@ tal_resultant tal_forces_gather(const tal_sim *sim, size_t grain) {
 
 void tal_forces_resultants(tal_sim *sim) {
   tal_grains *g = &sim->grains;
+  tal_grains_show(g);
   for (size_t i = 0; i < g->count; i++) {
     tal_resultant f = tal_forces_gather(sim, i);
     g->rx[i] = f.elastic_x + f.viscous_x + f.friction_x;
@@ -223,6 +224,7 @@ void tal_forces_finish_step(tal_sim *sim, double dt, double credit) {
       for (int m = 0; m < 8; m++)
         sums.force[m][k] = member[m];
     }
-    tal_kick(sim, &sums, start, here, dt, credit);
+    tal_kick(sim, &sums, start, here, dt);
   }
+  tal_kick_book(sim, credit);
 }

@@ -5,7 +5,8 @@
 
 #include "base.h"
 
-// X(type, name, unit, kept, meaning). kept: STATE is what a checkpoint holds, WORK can be recomputed.
+// X(type, name, unit, kept, meaning). kept: STATE is what a checkpoint holds, WORK can be recomputed,
+// SEEN has memory only where someone looks between steps.
 #define TAL_GRAIN_FIELDS(X)                                                                                            \
   X(int64_t, id, "1", STATE, "identity, 0-based, in packing order")                                                    \
   X(double, x, "m", STATE, "centre")                                                                                   \
@@ -22,29 +23,28 @@
   X(double, inertia, "kg m^2", STATE, "moment of inertia, scaling included")                                           \
   X(double, inverse_mass, "1/kg", STATE, "0 for a fixed grain")                                                        \
   X(double, inverse_inertia, "1/(kg m^2)", STATE, "0 where the spin is held")                                          \
-  X(double, friction_work, "J", STATE, "work done on the grain by tangential contact forces")                          \
-  X(double, damping_work, "J", STATE, "work done on the grain by the viscous part of normal contact forces")           \
-  X(double, boundary_work, "J", STATE, "work done on the grain by boundary forces (pressure)")                         \
-  X(double, held_work, "J", STATE, "work done by what holds a fixed grain or a held spin")                             \
   X(double, window_vx, "m/s", STATE, "velocity when the window of mean forces began")                                  \
   X(double, window_vy, "m/s", STATE, "velocity when the window of mean forces began")                                  \
   X(double, bx, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
   X(double, by, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
-  X(double, rx, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
-  X(double, ry, "N", WORK, "observed resultant of contacts and boundaries, gravity left out")                          \
-  X(double, rtorque, "N m", WORK, "observed resultant torque")                                                         \
+  X(double, rx, "N", SEEN, "observed resultant of contacts and boundaries, gravity left out")                          \
+  X(double, ry, "N", SEEN, "observed resultant of contacts and boundaries, gravity left out")                          \
+  X(double, rtorque, "N m", SEEN, "observed resultant torque")                                                         \
   X(double, x_list, "m", STATE, "centre when the neighbour list was built")                                            \
   X(double, y_list, "m", STATE, "centre when the neighbour list was built")
 
 typedef struct tal_grains {
   size_t count;
-#define X(type, name, unit, kept, meaning) type *name; // owned; [count]
+#define X(type, name, unit, kept, meaning) type *name; // owned; [count]; SEEN may be NULL
   TAL_GRAIN_FIELDS(X)
 #undef X
 } tal_grains;
 
 // Zeroed arrays for `count` grains, ids 0..count-1.
 void tal_grains_init(tal_grains *grains, size_t count);
+// Gives the SEEN fields memory where they have none, and takes it away.
+void tal_grains_show(tal_grains *grains);
+void tal_grains_hide(tal_grains *grains);
 void tal_grains_clear(tal_grains *grains);
 
 #endif

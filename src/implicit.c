@@ -194,6 +194,7 @@ static void take_velocities(tal_sim *sim, double credit) {
   const tal_implicit_body *body = sim->implicit.lane.body;
   const double per_kick = 1 / sim->dt;
   const bool spin = sim->effects & TAL_EFFECT_SPIN, boundary = sim->effects & TAL_EFFECT_BOUNDARY;
+  double power = 0; // of the boundary
 #pragma omp parallel for schedule(static) if (g->count > PARALLEL_FROM)
   for (size_t i = 0; i < g->count; i++) {
     const tal_lanes mean = 0.5 * (body[i].before + body[i].now), change = per_kick * (body[i].now - body[i].before);
@@ -205,9 +206,10 @@ static void take_velocities(tal_sim *sim, double credit) {
       g->omega[i] = mean[2];
       g->torque[i] = g->inertia[i] * change[2];
     }
-    if (boundary)
-      g->boundary_work[i] += credit * (g->bx[i] * mean[0] + g->by[i] * mean[1]);
   }
+  for (size_t i = 0; boundary && i < g->count; i++)
+    power += g->bx[i] * g->vx[i] + g->by[i] * g->vy[i];
+  sim->run.boundary_work += credit * power;
 }
 
 // Books what the contacts did to the grains: a wall slot's part that goes with the wall is the wall's [eq (17)].

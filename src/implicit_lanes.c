@@ -4,6 +4,7 @@
 // after a stop.
 #include "implicit.h"
 
+#include "damping.h"
 #include "sim.h"
 
 #include <stdlib.h>
@@ -149,7 +150,7 @@ static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t la
   s->slot[lane] = slot;
   s->filler[lane] = false;
   s->stiffness[lane] = slots->stiffness[c];
-  s->damping[lane] = slots->damping[c];
+  s->damping[lane] = tal_damping_of_slot(sim, slots, c);
   s->friction[lane] = wall ? slots->friction[c] : sim->friction;
   s->radius_i[lane] = g->r[i];
   s->reach[lane] = g->r[i] + (wall ? 0 : g->r[j]);

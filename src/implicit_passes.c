@@ -7,6 +7,7 @@
 #include "implicit_parts.h"
 
 #include "effects.h"
+#include "hot.h"
 
 #include <omp.h>
 
@@ -47,7 +48,7 @@ static double take_colour(const tal_implicit_solve *s, tal_implicit_pass what, s
                           double factor) {
   double largest = 0;
   for (size_t start = from; start < to; start += size) {
-    double change = tal_implicit_take(s, what, start, (int)(to - start < size ? to - start : size), factor);
+    double change = s->sim->hot->implicit_take(s, what, start, (int)(to - start < size ? to - start : size), factor);
     largest = change > largest ? change : largest;
   }
   return largest;
@@ -69,7 +70,7 @@ static void work_tile(const tal_implicit_solve *s, tal_implicit_tile *tile) {
   const size_t *first = s->system->first + tile->colour, end = first[tile->colours];
   tile->work = (tal_implicit_works){0, 0};
   for (size_t start = first[0]; start < end; start += BLOCK) {
-    tal_implicit_works part = tal_implicit_work(s, start, (int)(end - start < BLOCK ? end - start : BLOCK));
+    tal_implicit_works part = s->sim->hot->implicit_work(s, start, (int)(end - start < BLOCK ? end - start : BLOCK));
     tile->work.friction += part.friction;
     tile->work.damping += part.damping;
   }

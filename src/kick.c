@@ -2,6 +2,9 @@
 // force that acts over the two half kicks around the instant of v [eq (16)].
 #include "kick.h"
 
+// Powers are added up in so many lanes.
+enum { LANES = 8 };
+
 // Adds the wall slots of the grains, in the order of the walls.
 static void add_walls(const tal_sim *sim, tal_force_block *sums, size_t start, int count) {
   const tal_contacts *s = &sim->wall_contacts;
@@ -20,8 +23,21 @@ static void add_walls(const tal_sim *sim, tal_force_block *sums, size_t start, i
   }
 }
 
-TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, int count, double dt, double credit,
-                     unsigned effects) {
+// Of one kick, one lane per grain.
+typedef struct powers {
+  double friction[TAL_KICK_GRAINS], damping[TAL_KICK_GRAINS], boundary[TAL_KICK_GRAINS], held[TAL_KICK_GRAINS];
+} __attribute__((aligned(64))) powers;
+
+// In an order that depends on no vector's width.
+TAL_KERNEL double add_up(const double *power, int count) {
+  double lane[LANES] = {0};
+  for (int k = 0; k < count; k += LANES)
+    for (int m = 0; m < LANES; m++)
+      lane[m] += power[k + m];
+  return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+}
+
+TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, int count, double dt, unsigned effects) {
   tal_grains *g = &sim->grains;
   const double *restrict ex = sums->force[0], *restrict ey = sums->force[1], *restrict dx = sums->force[2];
   const double *restrict dy = sums->force[3], *restrict tx = sums->force[4], *restrict ty = sums->force[5];
@@ -31,8 +47,10 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
   const double *restrict bx = g->bx + start, *restrict by = g->by + start;
   double *restrict vx = g->vx + start, *restrict vy = g->vy + start, *restrict omega = g->omega + start;
   double *restrict fx = g->fx + start, *restrict fy = g->fy + start, *restrict torque = g->torque + start;
-  double *restrict friction_work = g->friction_work + start, *restrict damping_work = g->damping_work + start;
-  double *restrict boundary_work = g->boundary_work + start, *restrict held_work = g->held_work + start;
+  powers p;
+  const int whole = (count + LANES - 1) / LANES * LANES;
+  for (int k = count; k < whole; k++)
+    p.friction[k] = p.damping[k] = p.boundary[k] = p.held[k] = 0;
   const double gravity_x = sim->scene->gravity[0], gravity_y = sim->scene->gravity[1], half = 0.5 * dt;
 #pragma omp simd
   for (int k = 0; k < count; k++) {
@@ -65,16 +83,21 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
         held_power -= inverse_inertia[k] == 0 ? turn * spin : 0;
     }
     if (effects & TAL_EFFECT_FRICTION)
-      friction_work[k] += credit * friction_power;
+      p.friction[k] = friction_power;
     if (effects & TAL_EFFECT_DAMPING)
-      damping_work[k] += credit * (dx[k] * u + dy[k] * v);
+      p.damping[k] = dx[k] * u + dy[k] * v;
     if (effects & TAL_EFFECT_BOUNDARY)
-      boundary_work[k] += credit * (bx[k] * u + by[k] * v);
+      p.boundary[k] = bx[k] * u + by[k] * v;
     if (effects & TAL_EFFECT_HELD) {
       held_power -= inverse_mass[k] == 0 ? x * u + y * v : 0;
-      held_work[k] += credit * held_power;
+      p.held[k] = held_power;
     }
   }
+  sim->powers[start / TAL_KICK_GRAINS] =
+      (tal_kick_powers){.friction = effects & TAL_EFFECT_FRICTION ? add_up(p.friction, whole) : 0,
+                        .damping = effects & TAL_EFFECT_DAMPING ? add_up(p.damping, whole) : 0,
+                        .boundary = effects & TAL_EFFECT_BOUNDARY ? add_up(p.boundary, whole) : 0,
+                        .held = effects & TAL_EFFECT_HELD ? add_up(p.held, whole) : 0};
 }
 
 // Every combination, so that what is absent costs nothing; but held motion, which takes the mask at run time.
@@ -84,7 +107,7 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
 #define TURNS_OR_NOT(mask)   HEAVY_OR_NOT(mask) HEAVY_OR_NOT((mask) | TAL_EFFECT_SPIN)
 #define EVERY_VARIANT        TURNS_OR_NOT(0) TURNS_OR_NOT(TAL_EFFECT_REGULARISED)
 
-void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt, double credit) {
+void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt) {
   unsigned effects = sim->effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY | TAL_EFFECT_BOUNDARY |
                                      TAL_EFFECT_HELD);
   if (sim->effects & TAL_EFFECT_FRICTION)
@@ -94,10 +117,24 @@ void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, doub
   switch (effects) {
 #define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
-    kick(sim, sums, start, count, dt, credit, (mask));                                                                 \
+    kick(sim, sums, start, count, dt, (mask));                                                                         \
     break;
     EVERY_VARIANT
   default:
-    kick(sim, sums, start, count, dt, credit, effects);
+    kick(sim, sums, start, count, dt, effects);
   }
+}
+
+void tal_kick_book(tal_sim *sim, double credit) {
+  tal_kick_powers sum = {0, 0, 0, 0};
+  for (size_t k = 0; k * TAL_KICK_GRAINS < sim->grains.count; k++) {
+    sum.friction += sim->powers[k].friction;
+    sum.damping += sim->powers[k].damping;
+    sum.boundary += sim->powers[k].boundary;
+    sum.held += sim->powers[k].held;
+  }
+  sim->run.friction_work += credit * sum.friction;
+  sim->run.damping_work += credit * sum.damping;
+  sim->run.boundary_work += credit * sum.boundary;
+  sim->run.held_work += credit * sum.held;
 }

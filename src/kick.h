@@ -4,10 +4,16 @@
 
 #include "contact_block.h"
 
+// Grains kicked at a time.
+enum { TAL_KICK_GRAINS = 64 };
+
 // Adds the wall slots, boundary forces and gravity to the sums of the grains [start, start + count), then the second
-// half kick and the ledger: velocities become those of the end of the step (integrate_verlet.c explains the order).
-// sums: one lane per grain, count <= TAL_BLOCK. dt [s]; credit [s]: mean of this and the next step, over which the
-// forces of this instant act.
-void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt, double credit);
+// half kick: velocities become those of the end of the step (integrate_verlet.c explains the order). sums: one lane per
+// grain, count <= TAL_KICK_GRAINS; start is a multiple of that, so that what the powers add up to depends on no thread.
+// dt [s].
+void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt);
+// The ledger, when all grains are kicked. credit [s]: mean of this and the next step, over which the forces of this
+// instant act.
+void tal_kick_book(tal_sim *sim, double credit);
 
 #endif

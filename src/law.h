@@ -30,9 +30,12 @@ typedef struct tal_law_constants {
 
 typedef struct tal_law_force {
   double fe, fd, ft;       // [N] as in contacts.h
+  double cap;              // [N] friction times normal force, bound of |ft|
   double spring_stiffness; // [N/m] tangential stiffness now
 } tal_law_force;
 
+// Without TAL_EFFECT_REGULARISED in the mask that law's force is left out: for loops that add it when all caps are
+// known.
 TAL_KERNEL tal_law_force tal_contact_law(tal_meeting m, tal_law_constants k, unsigned effects) {
   double touching = m.overlap > 0 ? m.overlap : 0;
   double root = effects & TAL_EFFECT_HERTZ ? sqrt(touching) : 1;
@@ -47,13 +50,13 @@ TAL_KERNEL tal_law_force tal_contact_law(tal_meeting m, tal_law_constants k, uns
     if (!(effects & TAL_EFFECT_HERTZ)) // Hertz: apart, the root is zero
       fn = m.overlap > 0 ? fn : 0;
   }
-  tal_law_force f = {.fe = fe, .fd = fn - fe};
+  tal_law_force f = {.fe = fe, .fd = fn - fe, .cap = m.friction * fn};
   if (effects & TAL_EFFECT_REGULARISED)
-    f.ft = tal_regularised_force(m.friction * fn, m.slip, k.inverse_vR, k.inverse_exponent);
+    f.ft = tal_regularised_force(f.cap, tal_root(fabs(m.slip) * k.inverse_vR, k.inverse_exponent), m.slip);
   if (effects & TAL_EFFECT_SPRING) {
     double slope = effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(m.stiffness, root) : (m.overlap > 0 ? m.stiffness : 0);
     f.spring_stiffness = k.tangential_ratio * slope;
-    f.ft = tal_spring_force(m.spring, m.spring_stiffness, f.spring_stiffness, m.slip_distance, m.friction * fn);
+    f.ft = tal_spring_force(m.spring, m.spring_stiffness, f.spring_stiffness, m.slip_distance, f.cap);
   }
   return f;
 }

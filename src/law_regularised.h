@@ -6,10 +6,9 @@
 #include "root.h"
 #include <math.h>
 
-// friction * normal [N], slip [m/s] with sign; returns the force on i along t [N].
-TAL_KERNEL double tal_regularised_force(double cap, double slip, double inverse_vR, double inverse_exponent) {
-  double f = cap * tal_root(fabs(slip) * inverse_vR, inverse_exponent);
-  return copysign(f, -slip);
+// cap = friction * normal [N]; root = (|slip| / vR)^(1/c); slip with sign. Returns the force on i along t [N].
+TAL_KERNEL double tal_regularised_force(double cap, double root, double slip) {
+  return copysign(cap * root, -slip);
 }
 
 #endif

@@ -2,8 +2,8 @@
 // slots are dealt out in that order. The list is safe while no two centres can have come closer by more than the skin.
 #include "neighbours.h"
 
-#include "contact_block.h"
 #include "damping.h"
+#include "kick.h"
 #include "law.h"
 #include "sim.h"
 
@@ -44,7 +44,8 @@ static void fill_pair(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   slots->reach[c] = g->r[i] + g->r[j];
   slots->stiffness[c] =
       sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_stiffness(modulus, modulus, reduced) : sim->scene->contact.stiffness;
-  slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
+  if (slots->damping)
+    slots->damping[c] = slot_damping(sim, slots->stiffness[c], reduced_mass(g->inverse_mass[i], g->inverse_mass[j]));
 }
 
 static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, int32_t w) {
@@ -72,7 +73,8 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
     if (o < old->count && old->i[o] == slots->i[c] && old->j[o] == slots->j[c]) {
       slots->spring[c] = old->spring[o];
       slots->spring_stiffness[c] = old->spring_stiffness[o];
-      slots->viscous[c] = old->viscous[o];
+      if (slots->viscous && old->viscous)
+        slots->viscous[c] = old->viscous[o];
     }
   }
 }
@@ -99,12 +101,15 @@ static void list_pairs(tal_sim *sim) {
   geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
-  const bool past = sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT);
-  tal_contacts_reserve_pairs(&fresh, pairs->count + pairs->count / 16 + 64, past);
+  const tal_contact_needs needs = {.past = sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT),
+                                   .solved = sim->effects & TAL_EFFECT_IMPLICIT,
+                                   .damped =
+                                       sim->effects & TAL_EFFECT_DAMPING && isnan(tal_damping_time_of_slots(sim))};
+  tal_contacts_reserve_pairs(&fresh, pairs->count + pairs->count / 32 + 64, needs);
   fresh.count = pairs->count;
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
-  if (past)
+  if (needs.past)
     carry_springs(&sim->pairs, &fresh);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
@@ -204,6 +209,8 @@ static void list_all(tal_sim *sim) {
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
     free(sim->grain_records);
     sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
+    free(sim->powers);
+    sim->powers = tal_alloc(g->count / TAL_KICK_GRAINS + 1, sizeof *sim->powers);
     n->grain_capacity = g->count;
   }
   tal_implicit_save(sim);

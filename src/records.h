@@ -22,4 +22,9 @@ typedef struct tal_force_record {
   double ft_half_overlap;        // [N m] ft d/2: the torque on either grain is ft d/2 - ft r
 } __attribute__((aligned(64))) tal_force_record;
 
+// Powers of forces on the grains of one kick [W].
+typedef struct tal_kick_powers {
+  double friction, damping, boundary, held;
+} tal_kick_powers;
+
 #endif

@@ -8,6 +8,7 @@
 #include "energy.h"
 #include "forced.h"
 #include "forces.h"
+#include "hot.h"
 #include "inspect.h"
 #include "integrate.h"
 #include "order.h"
@@ -136,6 +137,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   *out = NULL;
   tal_sim *sim = tal_alloc(1, sizeof *sim);
   sim->scene = scene;
+  sim->hot = tal_hot_best();
   tal_status status = make_grains(sim, err);
   if (status) {
     tal_sim_free(sim);
@@ -183,6 +185,7 @@ void tal_sim_free(tal_sim *sim) {
   free(sim->grain_records);
   free(sim->force_records);
   free(sim->sums);
+  free(sim->powers);
   tal_graph_clear(&sim->graph);
   free(sim);
 }

@@ -63,8 +63,10 @@
   X(double, rest, "1", "mean unbalanced force over mean contact force, averaged over the last window")                 \
   X(int64_t, forced, "1", "1 + index of the grain whose spin is imposed; 0: none")                                     \
   X(int64_t, stage_done, "1", "1 once the current stage has reached its end")                                          \
-  X(double, friction_work, "J", "work on grains by tangential forces that were solved implicitly")                     \
-  X(double, damping_work, "J", "work on grains by viscous forces that were solved implicitly")                         \
+  X(double, friction_work, "J", "work on grains by tangential contact forces")                                         \
+  X(double, damping_work, "J", "work on grains by the viscous part of normal contact forces")                          \
+  X(double, boundary_work, "J", "work on grains by boundary forces")                                                   \
+  X(double, held_work, "J", "work by what holds fixed grains and held spins")                                          \
   X(double, kinetic0, "J", "kinetic energy at the start")                                                              \
   X(double, elastic0, "J", "elastic energy at the start")                                                              \
   X(double, gravity0, "J", "potential energy of gravity at the start")
@@ -145,6 +147,7 @@ typedef struct tal_sim tal_sim;
 typedef struct tal_law tal_law;
 typedef struct tal_integrator tal_integrator;
 typedef struct tal_boundary tal_boundary;
+typedef struct tal_hot tal_hot;
 typedef struct tal_stage tal_stage;
 
 // Constants derived once from scene and packing.
@@ -163,6 +166,7 @@ typedef struct tal_constants {
 
 struct tal_sim {
   const tal_scene *scene; // borrowed
+  const tal_hot *hot;     // the hot loops for this processor
   tal_constants constants;
   tal_grains grains;
   tal_contacts pairs;         // grain-grain slots
@@ -171,6 +175,7 @@ struct tal_sim {
   tal_grain_record *grain_records; // owned; [grains] what the contact laws see
   tal_force_record *force_records; // owned; [force_capacity] what they answer, per slot, where it is kept
   tal_force_record *sums;          // owned; [sums_capacity] rings of the hot loop, zero between steps
+  tal_kick_powers *powers;         // owned; [grains / TAL_KICK_GRAINS + 1] of this step
   size_t force_capacity, sums_capacity;
   bool forces_kept; // the force records are those of the last step or sweep
   tal_neighbours neighbours;

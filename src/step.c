@@ -191,14 +191,19 @@ tal_status tal_step_refresh(tal_sim *sim, tal_error *err) {
   return TAL_OK;
 }
 
+// Squares of lengths [m^2].
 static double displacement_since_refresh(const tal_sim *sim, size_t i) {
-  return hypot(sim->grains.x[i] - sim->graph.x[i], sim->grains.y[i] - sim->graph.y[i]);
+  const double dx = sim->grains.x[i] - sim->graph.x[i], dy = sim->grains.y[i] - sim->graph.y[i];
+  return dx * dx + dy * dy;
 }
 
 static double largest_displacement(const tal_sim *sim) {
   double largest = 0;
-  for (size_t i = 0; i < sim->grains.count; i++)
-    largest = fmax(largest, displacement_since_refresh(sim, i));
+#pragma omp simd reduction(max : largest)
+  for (size_t i = 0; i < sim->grains.count; i++) {
+    double here = displacement_since_refresh(sim, i);
+    largest = here > largest ? here : largest;
+  }
   return largest;
 }
 
@@ -209,12 +214,16 @@ static double displacement_of_loop(const tal_sim *sim) {
   return largest;
 }
 
+static double square(double x) {
+  return x * x;
+}
+
 static bool refresh_due(const tal_sim *sim) {
   const tal_scene_continuum *plan = &sim->scene->continuum;
   const double diameter = 2 * sim->constants.mean_radius;
   int64_t steps = sim->run.step - sim->run.refresh_step;
   if (sim->run.settling)
-    return steps % 10 == 0 && displacement_of_loop(sim) >= 0.25 * diameter;
+    return steps % 10 == 0 && displacement_of_loop(sim) >= square(0.25 * diameter);
   if (plan->refresh_steps > 0)
     return steps >= plan->refresh_steps;
   double strained =
@@ -225,7 +234,7 @@ static bool refresh_due(const tal_sim *sim) {
   double limit = isnan(plan->refresh_displacement) ? 0.02 : plan->refresh_displacement;
   if (steps % 10 || (!isnan(plan->refresh_strain) && sim->run.strain_begun))
     return false;
-  return largest_displacement(sim) >= limit * diameter;
+  return largest_displacement(sim) >= square(limit * diameter);
 }
 
 // Passes over finished stages; false with TAL_OK when all are done.

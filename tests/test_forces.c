@@ -56,9 +56,15 @@ static void hot_step(tal_sim *sim) {
 
 static void assert_same_arrays(const engine *a, const engine *b, const char *name) {
 #define X(type, member, unit, kept, meaning)                                                                           \
-  if (memcmp(a->sim->grains.member, b->sim->grains.member, a->sim->grains.count * sizeof(type)) != 0)                  \
+  if (a->sim->grains.member && b->sim->grains.member &&                                                                \
+      memcmp(a->sim->grains.member, b->sim->grains.member, a->sim->grains.count * sizeof(type)) != 0)                  \
     fail_msg("%s: %s differs", name, #member);
   TAL_GRAIN_FIELDS(X)
+#undef X
+#define X(type, member, unit, meaning)                                                                                 \
+  if (memcmp(&a->sim->run.member, &b->sim->run.member, sizeof(type)) != 0)                                             \
+    fail_msg("%s: %s of the run differs", name, #member);
+  TAL_RUN_FIELDS(X)
 #undef X
 }
 

@@ -1,0 +1,11 @@
+// One thread's part of the sweep over the contacts.
+#ifndef TAL_FORCES_RANGE_H
+#define TAL_FORCES_RANGE_H
+
+#include "contact_block.h"
+
+// Works out the contacts of part `part` of `parts` ranges of grains, which run side by side, sums them and kicks the
+// grains. sim->sums holds a ring of zeros for each part.
+void tal_forces_range(tal_sim *sim, const tal_sweep *sweep, int part, int parts);
+
+#endif
