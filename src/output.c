@@ -174,11 +174,12 @@ static tal_status cut_back(tal_output *output, tal_error *err) {
   tal_status status = tal_csv_resume_all(output, &output->files, err);
   if (status != TAL_OK)
     return status;
-  status = tal_fields_drop_later(output, err);
-  if (status != TAL_OK || output->files.frame_count == 0)
-    return status;
-  status = tal_fields_index(output, err);
-  return status == TAL_OK ? tal_xdmf_write(output, err) : status;
+  if (output->files.frame_count > 0) { // the lists first: killed here, none names a frame that is gone
+    status = tal_fields_index(output, err);
+    if (status == TAL_OK)
+      status = tal_xdmf_write(output, err);
+  }
+  return status == TAL_OK ? tal_fields_drop_later(output, err) : status;
 }
 
 static tal_status resume_files(tal_output *output, const char *checkpoint, tal_sim *sim, tal_error *err) {
