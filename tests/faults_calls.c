@@ -124,15 +124,18 @@ static void fail_all(program *p, bool resumed) {
   bench b = {.resumed = resumed};
   begin_bench(p, &b);
   for (size_t k = 0; k < sizeof ways / sizeof *ways; k++) {
+    if (resumed && !faults_long() && k % 3)
+      continue;
     const long all = calls(p, &b, ways[k].call);
-    const long stride = faults_long() ? 1 : all / 2 + 1;
+    const long stride = faults_long() ? 1 : all + 1;
     long trials = 0;
     char what[80];
-    for (long n = 1 + (long)k % stride; fail_nth(p, &b, &ways[k], n); n += stride)
+    for (long n = faults_long() ? 1 : 1 + (long)(7 * k) % (all ? all : 1); fail_nth(p, &b, &ways[k], n); n += stride)
       trials++;
-    assert_true(trials >= all / stride);
+    assert_int_equal(trials, all ? (faults_long() ? all : 1) : 0);
     snprintf(what, sizeof what, "%s%s", ways[k].what, resumed ? ", resumed" : "");
-    faults_held(what, trials, "one line, exit 4 or no harm; resumed to the same bits");
+    if (trials)
+      faults_held(what, trials, "one line, exit 4 or no harm; resumed to the same bits");
   }
   free(b.print);
 }

@@ -53,10 +53,11 @@ static void leave_mark(void) {
 }
 
 __attribute__((destructor)) static void write_count(void) {
+  const long seen = atomic_load(&plan.seen); // this opening counts too
   FILE *file = plan.counts ? fopen(plan.mark, "w") : NULL;
   if (!file)
     return;
-  fprintf(file, "%ld\n", atomic_load(&plan.seen));
+  fprintf(file, "%ld\n", seen);
   fclose(file);
 }
 
