@@ -1,5 +1,5 @@
 # Talus. `make demo` runs the main job, `make test` passes the tests; both install what is missing on Debian.
-#   make [MODE=native|debug|asan|tsan] [CC=gcc|clang] [BUILD=build] [PREFIX=/usr/local] [EXTRA=FLAGS] [HAVE_CGAL=]
+#   make [MODE=native|costs|debug|asan|tsan] [CC=gcc|clang] [BUILD=build] [PREFIX=/usr/local] [EXTRA=FLAGS] [HAVE_CGAL=]
 
 VERSION := 0.1.0
 MODE    ?= native
@@ -23,6 +23,8 @@ HAVE_CGAL := $(shell $(CXX) -E -x c++ -include CGAL/version.h /dev/null >/dev/nu
 # fused multiply-add. -fno-math-errno and -fno-trapping-math change no result; they let loops vectorise.
 FLOAT    := -ffp-contract=off -fno-math-errno -fno-trapping-math
 native   := -O3 -march=native -g
+# What valgrind knows.
+costs    := -O3 -march=x86-64-v3 -g
 debug    := -O0 -g
 asan     := -O1 -g -fsanitize=address,undefined -fno-omit-frame-pointer -fno-sanitize-recover=undefined
 tsan     := -O1 -g -fsanitize=thread
@@ -47,8 +49,8 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers faults format format-check install clean deps \
-  deps-program check-deps
+.PHONY: all demo test build-tests run-tests short asan tsan bench bench-peers costs faults format format-check install clean \
+  deps deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -73,7 +75,7 @@ $(OUT)/%.o: %.c $(OUT)/flags
 $(OUT)/%.o: %.cpp $(OUT)/flags
 	@mkdir -p $(@D)
 	$(CXX) $(CXXFLAGS) -MMD -MP -c -o $@ $<
--include $(wildcard $(OUT)/geom/*.d $(OUT)/src/*.d $(OUT)/tests/*.d $(OUT)/tests/bench/*.d $(OUT)/tests/faults/*.d)
+-include $(wildcard $(OUT)/geom/*.d $(OUT)/src/*.d $(OUT)/tests/*.d $(OUT)/tests/*/*.d)
 
 # Rewritten, and so everything rebuilt, only when the compiler or a flag changes.
 $(OUT)/flags: check-deps
@@ -117,7 +119,13 @@ bench: $(BENCHES)
 bench-peers: $(OUT)/tests/bench/bench_step
 	@sh tests/bench/peers.sh $<
 
-FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch] tests/faults/*.c)
+# Instructions per grain and step, effect by effect, against those on record.
+costs:
+	@sh tests/install-deps.sh valgrind
+	@$(MAKE) --no-print-directory $(JOBS) MODE=costs $(BUILD)-costs/tests/costs/costs
+	@sh tests/costs/run.sh $(BUILD)-costs/tests/costs/costs
+
+FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch] tests/costs/*.c tests/faults/*.c)
 format:
 	clang-format -i $(FORMATTED)
 format-check:
@@ -146,4 +154,4 @@ install: all
 	@echo "$$PC" > $(to)/lib/pkgconfig/talus.pc
 	@[ -n "$(DESTDIR)" ] || ldconfig 2>/dev/null || true
 clean:
-	rm -rf $(BUILD) $(BUILD)-debug $(BUILD)-asan $(BUILD)-tsan
+	rm -rf $(BUILD) $(BUILD)-debug $(BUILD)-asan $(BUILD)-tsan $(BUILD)-costs

@@ -2,6 +2,7 @@
 #include "cli.h"
 
 #include "boundary_minimal.h"
+#include "cli_check.h"
 #include "critical.h"
 #include "damping.h"
 #include "effects.h"
@@ -14,28 +15,9 @@
 #include <time.h>
 
 static void print_effects(const tal_sim *sim) {
-  static const struct {
-    unsigned bit;
-    const char *name;
-  } names[] = {{TAL_EFFECT_HERTZ, "hertz"},
-               {TAL_EFFECT_DAMPING, "damping"},
-               {TAL_EFFECT_REGULARISED, "regularised friction"},
-               {TAL_EFFECT_SPRING, "spring friction"},
-               {TAL_EFFECT_SPIN, "rotation"},
-               {TAL_EFFECT_GRAVITY, "gravity"},
-               {TAL_EFFECT_BOUNDARY, "boundary forces"},
-               {TAL_EFFECT_WALLS, "walls or plates"},
-               {TAL_EFFECT_HELD, "driven grains"},
-               {TAL_EFFECT_IMPLICIT, "friction and damping solved implicitly"}};
-  printf("effects       ");
-  if (!(sim->effects & TAL_EFFECT_HERTZ))
-    printf("linear contact");
-  const char *comma = sim->effects & TAL_EFFECT_HERTZ ? "" : ", ";
-  for (size_t k = 0; k < sizeof names / sizeof *names; k++)
-    if (sim->effects & names[k].bit) {
-      printf("%s%s", comma, names[k].name);
-      comma = ", ";
-    }
+  char names[256];
+  tal_check_effect_names(sim->effects, names, sizeof names);
+  printf("effects       %s%s", sim->effects & TAL_EFFECT_HERTZ ? "" : "linear contact, ", names);
   printf("  (first stage)\nkernel        %s, mask %u\n", sim->scene->integrator.scheme, sim->effects & TAL_EFFECT_LAW);
 }
 
@@ -212,7 +194,7 @@ static void print_penalties(tal_sim *sim) {
   }
 }
 
-static void print_cost(tal_sim *sim) {
+static void print_cost(tal_sim *sim, tal_scene *scene) {
   double steps = planned_steps(sim->scene), grains = (double)sim->grains.count;
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
   if (steps == 0)
@@ -221,6 +203,7 @@ static void print_cost(tal_sim *sim) {
   double rate = measured_rate(sim);
   printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps, 1e-6 * rate * grains,
          steps / rate);
+  tal_check_print_costs(sim, scene, 1 / rate);
 }
 
 int tal_cli_check(int argc, char **argv) {
@@ -244,7 +227,7 @@ int tal_cli_check(int argc, char **argv) {
     print_effects(sim);
     print_numbers(sim);
     print_penalties(sim);
-    print_cost(sim);
+    print_cost(sim, &scene);
     tal_sim_free(sim);
   }
   tal_scene_clear(&scene);

@@ -77,25 +77,26 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
   }
 }
 
-// Biaxial tests; the rest by the run-time mask.
-#define VARIANTS(X)                                                                                                    \
-  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN)                               \
-  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)                                    \
-  X(TAL_EFFECT_BOUNDARY | TAL_EFFECT_DAMPING)                                                                          \
-  X(TAL_EFFECT_BOUNDARY)
+// Every combination, so that what is absent costs nothing; but held motion, which takes the mask at run time.
+#define DAMPED_OR_NOT(mask)  ONE(mask) ONE((mask) | TAL_EFFECT_DAMPING)
+#define PRESSED_OR_NOT(mask) DAMPED_OR_NOT(mask) DAMPED_OR_NOT((mask) | TAL_EFFECT_BOUNDARY)
+#define HEAVY_OR_NOT(mask)   PRESSED_OR_NOT(mask) PRESSED_OR_NOT((mask) | TAL_EFFECT_GRAVITY)
+#define TURNS_OR_NOT(mask)   HEAVY_OR_NOT(mask) HEAVY_OR_NOT((mask) | TAL_EFFECT_SPIN)
+#define EVERY_VARIANT        TURNS_OR_NOT(0) TURNS_OR_NOT(TAL_EFFECT_REGULARISED)
 
 void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt, double credit) {
-  const unsigned effects = sim->effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION | TAL_EFFECT_SPIN |
-                                           TAL_EFFECT_GRAVITY | TAL_EFFECT_BOUNDARY | TAL_EFFECT_HELD);
+  unsigned effects = sim->effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY | TAL_EFFECT_BOUNDARY |
+                                     TAL_EFFECT_HELD);
+  if (sim->effects & TAL_EFFECT_FRICTION)
+    effects |= TAL_EFFECT_REGULARISED; // either law: the forces are there
   if (sim->effects & TAL_EFFECT_WALLS)
     add_walls(sim, sums, start, count);
   switch (effects) {
-#define X(mask)                                                                                                        \
+#define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
     kick(sim, sums, start, count, dt, credit, (mask));                                                                 \
     break;
-    VARIANTS(X)
-#undef X
+    EVERY_VARIANT
   default:
     kick(sim, sums, start, count, dt, credit, effects);
   }

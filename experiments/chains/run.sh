@@ -1,5 +1,5 @@
 #!/bin/sh
-# Runs the experiment: `run.sh` everything (about two minutes of one core), `run.sh --short` a check of the whole chain in
+# Runs the experiment: `run.sh` everything (about three minutes of one core), `run.sh --short` a check of the whole chain in
 # seconds. Finished runs are kept, interrupted ones are resumed. TALUS names the program, OUT the folder, SEEDS the
 # samples (1 to 5).
 set -eu
@@ -28,7 +28,7 @@ if [ "${1:-}" = --short ]; then
 fi
 
 for seed in $seeds; do
-  run "biaxial-$seed" --set "seed=$seed" --set output.fields_every=0.4
-  "$talus" measure "$out/biaxial-$seed" --at 0.004,peak,0.1
+  run "biaxial-$seed" --set "seed=$seed" --set output.fields_every=0.2
+  "$talus" measure "$out/biaxial-$seed" --at 0.001,peak,0.1
 done
 sh "$here/summary.sh" "$out"/biaxial-*

@@ -1,0 +1,14 @@
+// Parts of `talus check`.
+#ifndef TAL_CLI_CHECK_H
+#define TAL_CLI_CHECK_H
+
+#include "sim.h"
+
+// The names of the effects in a mask (effects.h), separated by commas.
+void tal_check_effect_names(unsigned effects, char *to, size_t size);
+// One line: what each effect of the present stage costs [ns per grain and step], found by short trials; nothing when
+// the stage ends or goes bad meanwhile. Shortens the steps of `scene`, which is that of `sim`; `step_seconds`: about
+// what a step takes.
+void tal_check_print_costs(tal_sim *sim, tal_scene *scene, double step_seconds);
+
+#endif
