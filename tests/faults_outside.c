@@ -94,8 +94,7 @@ static long read_last_frame(const char *path) {
 // EXACT: fields.h5 opened over and over while the run writes it: each time a whole frame, and the run has its bits.
 static void read_while_running(void **state) {
   static const char *const often[] = {
-      "--set=output={series_every: 2e-4, fields_every: 3e-5, checkpoint_every: 1e-4, tracks: [1]}",
-      NULL};
+      "--set=output={series_every: 2e-4, fields_every: 3e-5, checkpoint_every: 1e-4, tracks: [1]}", NULL};
   program *p = *state;
   char *print = whole(p, often), path[4400];
   snprintf(path, sizeof path, "%s", program_path(p, "parts/fields.h5"));
