@@ -5,6 +5,7 @@
 #define TAL_TEST_FAULTS_H
 
 #include "program.h"
+#include "verify.h"
 #include <time.h>
 
 static inline bool faults_long(void) {
@@ -149,12 +150,19 @@ static inline void assert_printed(program *p, const char *dir, const char *print
   free(now);
 }
 
-// `talus verify` finds no damage.
+static inline void fail_on_damage(void *what, bool damage, const char *sentence) {
+  if (damage)
+    fail_msg("%s: verify: %s", (const char *)what, sentence);
+}
+
+// What `talus verify` looks at shows no damage.
 static inline void assert_sound(program *p, const char *dir, const char *what) {
-  outcome got;
-  program_run(p, WORDS("verify", dir), &got);
-  if (got.code != 0)
-    fail_msg("%s: verify: exit %d\n%s%s", what, got.code, got.out, got.err);
+  tal_verify_counts counts;
+  tal_error err;
+  char path[4400];
+  snprintf(path, sizeof path, "%s/%s", p->folder, dir);
+  if (tal_verify(path, fail_on_damage, (void *)(uintptr_t)what, &counts, &err) != TAL_OK)
+    fail_msg("%s: verify: %s", what, err.text);
 }
 
 static inline bool faults_checkpoint_there(program *p, const char *dir) {
