@@ -3,6 +3,7 @@
 #include "cli_check.h"
 
 #include "effects.h"
+#include "neighbours.h"
 
 #include <math.h>
 #include <omp.h>
@@ -73,6 +74,7 @@ static bool try_rung(tal_sim *sim, rung *r, int steps) {
   tal_error err;
   bool fine = !tal_sim_done(sim);
   sim->effects = r->effects;
+  tal_neighbours_rebuild(sim); // contacts keep what the effects ask for
   fine = fine && tal_sim_step(sim, &err) == TAL_OK;
   const double started = cpu_now();
   for (int k = 0; k < steps && fine; k++)
@@ -80,6 +82,7 @@ static bool try_rung(tal_sim *sim, rung *r, int steps) {
   if (fine)
     r->seconds = fmin(r->seconds, (cpu_now() - started) / steps);
   sim->effects = all;
+  tal_neighbours_rebuild(sim);
   return fine;
 }
 
@@ -100,6 +103,6 @@ void tal_check_print_costs(tal_sim *sim, tal_scene *scene, double step_seconds) 
     if (k == 0)
       printf("%s contacts and motion %.3g", *ladder[k].name ? ladder[k].name : "linear", ns * ladder[k].seconds);
     else
-      printf(", %s %+.2g", ladder[k].name, ns * (ladder[k].seconds - ladder[k - 1].seconds));
+      printf(", %s %+.3g", ladder[k].name, ns * (ladder[k].seconds - ladder[k - 1].seconds));
   printf("\n");
 }

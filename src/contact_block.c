@@ -136,24 +136,20 @@ TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, size_t start, int co
   work_out(&b, &sim->pairs, sweep, start, count, out, effects);
 }
 
-// The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
-#define VARIANTS(X)                                                                                                    \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED | TAL_EFFECT_SPIN)                                  \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING | TAL_EFFECT_SPIN)                                       \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING)                                                                             \
-  X(TAL_EFFECT_HERTZ)                                                                                                  \
-  X(TAL_EFFECT_DAMPING)                                                                                                \
-  X(0)
+// A variant for every combination the law can see, from one body: what is absent costs nothing.
+#define DAMPED_OR_NOT(mask) ONE(mask) ONE((mask) | TAL_EFFECT_DAMPING)
+#define TURNS_OR_NOT(mask)  DAMPED_OR_NOT(mask) DAMPED_OR_NOT((mask) | TAL_EFFECT_SPIN)
+#define EACH_FRICTION(mask)                                                                                            \
+  DAMPED_OR_NOT(mask) TURNS_OR_NOT((mask) | TAL_EFFECT_REGULARISED) TURNS_OR_NOT((mask) | TAL_EFFECT_SPRING)
+#define EVERY_VARIANT EACH_FRICTION(0) EACH_FRICTION(TAL_EFFECT_HERTZ)
 
 void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out) {
-  switch (sweep->law) {
-#define X(mask)                                                                                                        \
+  // without friction it is nothing to a contact that grains turn
+  switch (sweep->law & TAL_EFFECT_FRICTION ? sweep->law : sweep->law & ~(unsigned)TAL_EFFECT_SPIN) {
+#define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
     block(sim, sweep, start, count, out, (mask));                                                                      \
     break;
-    VARIANTS(X)
-#undef X
-  default:
-    block(sim, sweep, start, count, out, sweep->law);
+    EVERY_VARIANT
   }
 }

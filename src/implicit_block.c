@@ -260,33 +260,36 @@ tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, 
   return (tal_implicit_works){0.5 * s->kick * sum.friction, 0.5 * s->kick * sum.damping};
 }
 
-// The variants a profile asked for; any other mask runs the same body with the mask at run time, to the same bits.
-#define VARIANTS(X)                                                                                                    \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED)                                                    \
-  X(TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING)
-
-TAL_KERNEL double take_block(const tal_implicit_solve *s, tal_implicit_pass what, size_t start, int count,
-                             double factor, unsigned effects) {
-  switch (what) {
-  case TAL_IMPLICIT_BEGIN:
-    begin_block(s, start, count, effects);
+// A variant for every combination that a pass looks at, from one body: what is absent costs nothing.
+static double take_begin(const tal_implicit_solve *s, size_t start, int count) {
+  switch (s->effects & (TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_SPRING)) {
+#define ONE(mask)                                                                                                      \
+  case (mask):                                                                                                         \
+    begin_block(s, start, count, (mask));                                                                              \
     return 0;
-  case TAL_IMPLICIT_CORRECT:
-    return correct_block(s, start, count, effects);
-  default:
-    return press_block(s, start, count, factor);
+#define DAMPED_OR_NOT(mask)  ONE(mask) ONE((mask) | TAL_EFFECT_DAMPING)
+#define SPRINGS_OR_NOT(mask) DAMPED_OR_NOT(mask) DAMPED_OR_NOT((mask) | TAL_EFFECT_SPRING)
+    SPRINGS_OR_NOT(0)
+    SPRINGS_OR_NOT(TAL_EFFECT_HERTZ)
   }
+  return 0;
+}
+
+static double take_correct(const tal_implicit_solve *s, size_t start, int count) {
+  if (s->effects & TAL_EFFECT_REGULARISED)
+    return correct_block(s, start, count, TAL_EFFECT_REGULARISED);
+  if (s->effects & TAL_EFFECT_SPRING)
+    return correct_block(s, start, count, TAL_EFFECT_SPRING);
+  return correct_block(s, start, count, 0);
 }
 
 double tal_implicit_take(const tal_implicit_solve *s, tal_implicit_pass what, size_t start, int count, double factor) {
-  const unsigned kinds = TAL_EFFECT_HERTZ | TAL_EFFECT_DAMPING | TAL_EFFECT_FRICTION;
-  switch (s->effects & kinds) {
-#define X(mask)                                                                                                        \
-  case (mask):                                                                                                         \
-    return take_block(s, what, start, count, factor, (mask));
-    VARIANTS(X)
-#undef X
+  switch (what) {
+  case TAL_IMPLICIT_BEGIN:
+    return take_begin(s, start, count);
+  case TAL_IMPLICIT_CORRECT:
+    return take_correct(s, start, count);
   default:
-    return take_block(s, what, start, count, factor, s->effects & kinds);
+    return press_block(s, start, count, factor);
   }
 }

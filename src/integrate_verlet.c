@@ -76,17 +76,11 @@ TAL_KERNEL int64_t drift(tal_grains *g, tal_grain_record *record, size_t start, 
 }
 
 static int64_t drift_variant(tal_sim *sim, size_t start, int count, double dt) {
-  const unsigned effects = sim->effects & (TAL_EFFECT_SPIN | TAL_EFFECT_SPRING);
-  switch (effects) {
-  case 0:
+  if (!(sim->effects & TAL_EFFECT_SPIN))
     return drift(&sim->grains, sim->grain_records, start, count, dt, 0);
-  case TAL_EFFECT_SPIN:
+  if (!(sim->effects & TAL_EFFECT_SPRING))
     return drift(&sim->grains, sim->grain_records, start, count, dt, TAL_EFFECT_SPIN);
-  case TAL_EFFECT_SPIN | TAL_EFFECT_SPRING:
-    return drift(&sim->grains, sim->grain_records, start, count, dt, TAL_EFFECT_SPIN | TAL_EFFECT_SPRING);
-  default:
-    return drift(&sim->grains, sim->grain_records, start, count, dt, effects);
-  }
+  return drift(&sim->grains, sim->grain_records, start, count, dt, TAL_EFFECT_SPIN | TAL_EFFECT_SPRING);
 }
 
 // Returns what no grain has moved further than [m].

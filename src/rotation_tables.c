@@ -112,7 +112,10 @@ tal_status tal_rotations_write(const tal_rotations *all, const char *dir, tal_er
 // ---- words ----
 
 static void say_interval(FILE *out, const char *what, tal_interval i, const char *rest) {
-  fprintf(out, "  %-34s %8.3f  [%.3f, %.3f]%s\n", what, i.value, i.low, i.high, rest);
+  if (isnan(i.value))
+    fprintf(out, "  %-34s     none\n", what);
+  else
+    fprintf(out, "  %-34s %8.3f  [%.3f, %.3f]%s\n", what, i.value, i.low, i.high, rest);
 }
 
 static void say_one(FILE *out, const tal_rotation *a, double reach) {

@@ -9,6 +9,8 @@
 
 #include "program.h"
 
+#include <math.h>
+
 typedef struct bad_scene {
   const char *what;
   int line; // of the scene, replaced by:
@@ -251,11 +253,38 @@ static void test_quasistatic(void **state) {
   }
 }
 
+// ROUND: `check` says what each effect of the scene costs: what the rungs add comes to what the whole takes, as
+// printed.
+static void test_costs(void **state) {
+  program *p = *state;
+  outcome got;
+  write_scene(p, 10, "stages: [{kind: free, duration: 1000}]");
+  program_run(p, WORDS("check", "s.yaml"), &got);
+  assert_outcome("check", &got, 0, "");
+  double all = 0, sum = 0, part;
+  int used = 0;
+  const char *costs = strstr(got.out, "costs "), *last = NULL;
+  assert_non_null(costs);
+  assert_int_equal(
+      sscanf(costs, "costs %lf ns per grain and step on one core: hertz contacts and motion %lf%n", &all, &sum, &used),
+      2);
+  const char *const effects[] = {"spring friction, rotation", "gravity", "walls or plates"};
+  for (size_t k = 0; k < 3; k++) {
+    last = strstr(costs + used, effects[k]);
+    assert_non_null(last);
+    assert_int_equal(sscanf(last + strlen(effects[k]), "%lf", &part), 1);
+    sum += part;
+  }
+  assert_true(all > 0);
+  assert_true(fabs(sum - all) < 0.05 * all + 1); // printed with two and three digits
+}
+
 int main(void) {
   const struct CMUnitTest tests[] = {
       program_test(test_bad_scenes), program_test(test_step_above_critical_of_the_packing),
       program_test(test_bad_lines),  program_test(test_questions),
       program_test(test_impact),     program_test(test_quasistatic),
+      program_test(test_costs),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -9,6 +9,8 @@ out=${OUT:-$here/../../rotation-run}
 seeds=${SEEDS:-1 2 3 4 5}
 grains=${GRAINS:-40}
 threads=${THREADS:-$(nproc)}
+settings='stages.0.pressure=25e3 stages.0.pressure=400e3 material.friction=0.2 material.friction=0.8
+  contact.exponent=5 contact.exponent=50'
 margin=10 # mean diameters between forced grains and the rim
 reach=10
 mkdir -p "$out"
@@ -51,31 +53,33 @@ ensemble() {
       --set "stages.1.grain={random: $grains, margin: $margin}"
   done
   "$talus" rotation "$out/ensemble" --reach "$reach" --network 0
-  "$talus" rotation "$out/ensemble" --reach "$reach"
+  "$talus" rotation "$out/ensemble" --reach "$reach" | tee "$out/ensemble/summary.txt"
 }
 
 # Pressure, friction and exponent, one at a time: friction and exponent from the confinement on.
 dials() {
-  for set in stages.0.pressure=25e3 stages.0.pressure=400e3 material.friction=0.2 material.friction=0.8 \
-    contact.exponent=5 contact.exponent=50; do
+  for set in $settings; do
     for seed in $seeds; do
       run "dials/$set/seed-$seed" -t "$threads" --no-figures --set "seed=$seed" --set "$set" "$@" \
         --set "stages.1.grain={random: $grains, margin: $margin}"
     done
     echo "$set"
-    "$talus" rotation "$out/dials/$set" --reach "$reach" --no-figures
+    "$talus" rotation "$out/dials/$set" --reach "$reach" --no-figures | tee "$out/dials/$set/summary.txt"
   done
+  if [ -e "$out/ensemble/summary.txt" ]; then "${PYTHON:-/usr/bin/python3}" "$here/dials.py" "$out"; fi
 }
 
 if [ "${1:-}" = --short ]; then
   trap 'rm -rf "$out"' EXIT
-  margin=2 reach=4 grains=3 seeds="1 2"
+  margin=2 reach=4 grains=3 seeds="1 2" settings=material.friction=0.8
   small="-q --no-figures --set grains.count=300 --set pack.width=22e-3 --set pack.cut.radius=8e-3 --set stages.0.ramp=0.5
     --set stages.0.unbalanced=0.02 --set stages.0.tolerance=0.2 --set stages.1.ramp=0.1 --set stages.1.hold=0.05"
   # shellcheck disable=SC2086
   one $small
   # shellcheck disable=SC2086
   ensemble $small
+  # shellcheck disable=SC2086
+  dials $small
   for folder in "$out/one" "$out"/ensemble/seed-*/ "$out"/ensemble/seed-*/runs/*/; do "$talus" verify "$folder"; done
   exit 0
 fi
