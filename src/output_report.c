@@ -191,6 +191,24 @@ static void read_stages(yaml_document_t *document, tal_stage_report *before, siz
   }
 }
 
+bool tal_output_reported_done(const tal_output *output) {
+  char path[TAL_PATH_SIZE];
+  unsigned char *text;
+  size_t size;
+  yaml_document_t document;
+  bool done = false;
+  tal_file_path(path, output->dir, "run.json");
+  if (tal_file_read(path, &text, &size, NULL) != TAL_OK)
+    return false;
+  if (load_document(&document, text, size)) {
+    const yaml_node_t *status = member(&document, yaml_document_get_root_node(&document), "status");
+    done = status && status->type == YAML_SCALAR_NODE && strcmp((const char *)status->data.scalar.value, "done") == 0;
+    yaml_document_delete(&document);
+  }
+  free(text);
+  return done;
+}
+
 void tal_report_read(const char *dir, tal_stage_report *before, size_t stage_count) {
   char path[TAL_PATH_SIZE];
   unsigned char *text;

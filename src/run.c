@@ -286,6 +286,15 @@ static tal_status run_opened(job *this, const tal_run_options *options, tal_run_
   return status;
 }
 
+// The run was killed between its last checkpoint and its last report.
+static tal_status report_late(job *this, tal_error *err) {
+  begin_accounts(this);
+  tal_sim_row(this->sim, &this->row);
+  tal_status status = report_run(this, "done", "", err);
+  free(this->stages);
+  return status;
+}
+
 // A thousand grains wait longer for a second thread than it saves. OMP_NUM_THREADS is the limit where it is set.
 int tal_run_threads(size_t grains, int asked) {
   int useful = 1 + (int)(grains / 2000), there = omp_get_max_threads();
@@ -339,6 +348,8 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
   }
   if (status == TAL_OK && !result->already_done)
     status = run_opened(&run, options, result, err);
+  else if (status == TAL_OK && !tal_output_reported_done(run.output))
+    status = report_late(&run, err);
   if (run.output)
     tal_output_close(run.output);
   tal_sim_free(run.sim);

@@ -109,6 +109,14 @@ static void random_moments(void **state) {
   faults_held("kill -9 at random moments", kills, "resumed to the bits of the unbroken run");
 }
 
+static void assert_reported_done(program *p, const char *what) {
+  size_t size;
+  char *report = program_read(p, "parts/run.json", &size);
+  if (!report || !strstr(report, "\"status\": \"done\""))
+    fail_msg("%s: run.json does not say that the run is done", what);
+  free(report);
+}
+
 // EXACT: killed before the n-th call that touches a file, and after half of the n-th write, for every n.
 static void every_call(void **state) {
   program *p = *state;
@@ -134,6 +142,7 @@ static void every_call(void **state) {
       if (faults_checkpoint_there(p, "parts"))
         assert_sound(p, "parts", what);
       faults_recover(p, &(faults_run){"parts", "1", t.sets, false}, t.print, what);
+      assert_reported_done(p, what);
       kills++;
     }
   }
