@@ -151,7 +151,9 @@ static void other_version(void **state) {
   faults_held("another version's checkpoint", 1, "refused, both versions named");
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+  if (argc > 1)
+    cmocka_set_test_filter(argv[1]);
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {
       faults_test(flipped_bits),

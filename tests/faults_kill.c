@@ -151,7 +151,9 @@ static void every_call(void **state) {
   faults_held("kill -9 at every call on a file, half writes", kills, "resumed to the bits of the unbroken run");
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+  if (argc > 1)
+    cmocka_set_test_filter(argv[1]);
   const struct CMUnitTest tests[] = {
       faults_test(random_moments),
       faults_test(every_call),

@@ -115,7 +115,9 @@ static void matrix(void **state) {
   faults_held("threads x resume point x cadence x variant", trials, "resumed to the bits of the unbroken run");
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+  if (argc > 1)
+    cmocka_set_test_filter(argv[1]);
   const struct CMUnitTest tests[] = {
       faults_test(every_variant_has_a_scene),
       faults_test(matrix),

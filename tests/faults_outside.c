@@ -246,7 +246,9 @@ static void full_and_read_only(void **state) {
   faults_held("a read-only disk", 2, "one line, exit 4; resumed to the same bits");
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+  if (argc > 1)
+    cmocka_set_test_filter(argv[1]);
   const struct CMUnitTest tests[] = {
       faults_test(signals),
       faults_test(read_while_running),
