@@ -57,8 +57,8 @@ TESTS    := $(patsubst %.c,$(OUT)/%,$(wildcard tests/*.c))
 BENCHES  := $(patsubst %.c,$(OUT)/%,$(wildcard tests/bench/*.c))
 JOBS      = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(shell nproc))
 
-.PHONY: all demo test build-tests run-tests hard run-hard short asan tsan bench bench-peers costs format format-check install \
-  clean deps deps-program check-deps
+.PHONY: all demo test build-tests run-tests hard run-hard faults short asan tsan bench bench-peers costs format \
+  format-check install clean deps deps-program check-deps
 .SECONDARY:
 .DELETE_ON_ERROR:
 
@@ -72,6 +72,11 @@ $(OUT)/libtalus.so: $(library)
 	$(CC) $(LDFLAGS) -shared -Wl,-soname,$(@F) -o $@ $^ $(LDLIBS)
 $(OUT)/tests/%: $(OUT)/tests/%.o $(OUT)/libtalus.a
 	$(CC) $(LDFLAGS) -o $@ $^ -lcmocka $(LDLIBS)
+# The program with its calls for files and memory failing on demand (tests/faults/inject.c).
+FAULTY   := open close read write fsync rename link unlink mkdir ftruncate flock fstat opendir fopen \
+  malloc calloc realloc aligned_alloc open_memstream
+$(OUT)/tests/faults/talus: $(OUT)/tests/faults/inject.o $(call objects,$(PROGRAM)) $(OUT)/libtalus.a
+	$(CC) $(LDFLAGS) $(FAULTY:%=-Wl,--wrap=%) -o $@ $^ $(LDLIBS)
 $(OUT)/%.o: %.c $(OUT)/flags
 	@mkdir -p $(@D)
 	$(CC) $(CFLAGS) -MMD -MP -c -o $@ $<
@@ -104,8 +109,8 @@ demo: deps-program
 	@sh experiments/biaxial/demo.sh $(OUT)/talus
 test: deps-program
 	@$(MAKE) --no-print-directory $(JOBS) run-tests
-build-tests: $(OUT)/talus $(TESTS) $(BENCHES)
-run-tests: $(OUT)/talus $(TESTS)
+build-tests: $(OUT)/talus $(OUT)/tests/faults/talus $(TESTS) $(BENCHES)
+run-tests: $(OUT)/talus $(OUT)/tests/faults/talus $(TESTS)
 	@TALUS=$(OUT)/talus sh tests/run.sh $(TESTS)
 # The hard cases: a table of what holds how far, and what happens beyond. LONG=1 adds hours.
 HARD := $(patsubst %.c,$(OUT)/%,$(wildcard tests/hard_*.c))
@@ -119,6 +124,10 @@ asan:
 tsan: export TSAN_OPTIONS := ignore_noninstrumented_modules=1 $(TSAN_OPTIONS)
 tsan:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=tsan CC=clang run-tests
+# Kills, full disks, failing calls, damaged checkpoints, signals in their long form (docs/faults.md): minutes, a table.
+FAULTS   := $(filter $(OUT)/tests/faults_%,$(TESTS))
+faults: $(OUT)/talus $(OUT)/tests/faults/talus $(FAULTS)
+	@TALUS=$(OUT)/talus sh tests/faults.sh $(FAULTS)
 # Every experiment in a form of seconds: that its scenes, commands and pictures work.
 short: all
 	@for t in experiments/test_*.py experiments/*/test_*.py; do TALUS=$(abspath $(OUT)/talus) $(PYTHON) $$t || exit 1; done
@@ -136,7 +145,7 @@ costs:
 	@$(MAKE) --no-print-directory $(JOBS) MODE=costs $(BUILD)-costs/tests/costs/costs
 	@sh tests/costs/run.sh $(BUILD)-costs/tests/costs/costs
 
-FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch] tests/costs/*.c)
+FORMATTED := $(HEADERS) $(wildcard geom/*.c geom/*.cpp src/*.c tests/*.[ch] tests/bench/*.[ch] tests/costs/*.c tests/faults/*.c)
 format:
 	clang-format -i $(FORMATTED)
 format-check:

@@ -10,7 +10,7 @@
 static inline void *geo_checked(void *memory, size_t count, size_t size) {
   if (memory)
     return memory;
-  fprintf(stderr, "out of memory (%zu elements of %zu bytes)\n", count, size);
+  fprintf(stderr, "talus: out of memory (%zu elements of %zu bytes)\n", count, size);
   exit(4);
 }
 

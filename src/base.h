@@ -4,6 +4,7 @@
 
 #include <stddef.h>
 #include <stdint.h>
+#include <stdio.h>
 
 // Also the program's exit codes.
 typedef enum tal_status {
@@ -27,6 +28,10 @@ void *tal_alloc(size_t count, size_t size);
 // Grows `old` (old_count elements) to `count`, keeping the contents, zeroing the rest. Same rules.
 void *tal_grow(void *old, size_t old_count, size_t count, size_t size);
 char *tal_strdup(const char *text);
+// A stream that writes into memory of its own: *text[*size], ended by a NUL, is whole and the caller's to free after
+// tal_text_end. Same rules: a text is never cut short.
+FILE *tal_text_begin(char **text, size_t *size);
+void tal_text_end(FILE *stream);
 
 #define TAL_PI 3.14159265358979323846
 

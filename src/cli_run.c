@@ -60,6 +60,12 @@ static int finish(tal_status status, const tal_run_result *result, const tal_cli
       fprintf(stderr, "; last good checkpoint: %s/checkpoint.h5", dir);
     fprintf(stderr, "\n");
     return status;
+  case TAL_IO:
+    fprintf(stderr, "talus: %s", err->text);
+    if (result->checkpoint)
+      fprintf(stderr, "; go on from the last checkpoint with: talus run %s -o %s --resume", options->argument, dir);
+    fprintf(stderr, "\n");
+    return status;
   case TAL_BAD_INPUT: // the sentence names file, line and key itself
     fprintf(stderr, "%s\n", err->text);
     return status;

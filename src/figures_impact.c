@@ -69,7 +69,7 @@ tal_status tal_impact_study_table(const tal_scene *scene, const tal_impact_study
   point points[POINTS];
   points_over_damping(scene, study, points);
   tal_file_path(path, folder, "impact.csv");
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   fprintf(out, "damping_number,damping[%s],restitution,contact_time[s],contact_time_over_t0\n",
           study->hertz ? "s" : "N s/m");
   for (int k = 0; k < POINTS; k++) {
@@ -80,9 +80,8 @@ tal_status tal_impact_study_table(const tal_scene *scene, const tal_impact_study
     else
       fprintf(out, "%.17g\n", p->time / study->reference);
   }
-  tal_status status = fclose(out) == 0 ? TAL_OK : tal_fail(err, TAL_IO, "%s: no memory for it", path);
-  if (status == TAL_OK)
-    status = tal_file_replace(path, NULL, text, size, err);
+  tal_text_end(out);
+  tal_status status = tal_file_replace(path, NULL, text, size, err);
   free(text);
   return status;
 }

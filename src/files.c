@@ -97,15 +97,28 @@ static tal_status write_temporary(const char *path, const void *data, size_t siz
   return status;
 }
 
+// Gives the file a second name in place of what has that name. Where the file system has no hard links it is renamed.
+static tal_status keep_as(const char *previous, const char *path, tal_error *err) {
+  char second[TAL_PATH_SIZE + 4];
+  snprintf(second, sizeof second, "%s.tmp", previous);
+  unlink(second); // of a run that was killed just here
+  bool kept = link(path, second) == 0 && rename(second, previous) == 0;
+  if (!kept)
+    kept = !tal_file_exists(path) || rename(path, previous) == 0;
+  const int why = errno;
+  unlink(second); // rename leaves both where they are names of one file
+  return kept ? TAL_OK : tal_fail(err, TAL_IO, "%s: cannot be kept as %s: %s", path, previous, strerror(why));
+}
+
 tal_status tal_file_replace(const char *path, const char *previous, const void *data, size_t size, tal_error *err) {
   char temporary[TAL_PATH_SIZE + 4];
   snprintf(temporary, sizeof temporary, "%s.tmp", path);
   tal_status status = write_temporary(temporary, data, size, err);
   if (status != TAL_OK)
     return status;
-  if (previous && rename(path, previous) != 0 && errno != ENOENT) {
-    status = tal_fail(err, TAL_IO, "%s: cannot be renamed to %s: %s", path, previous, strerror(errno));
-  } else if (rename(temporary, path) != 0) {
+  if (previous)
+    status = keep_as(previous, path, err);
+  if (status == TAL_OK && rename(temporary, path) != 0) {
     status = tal_fail(err, TAL_IO, "%s: cannot be renamed to %s: %s", temporary, path, strerror(errno));
   }
   if (status != TAL_OK) {

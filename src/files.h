@@ -22,8 +22,8 @@ tal_status tal_folder_create(const char *path, tal_error *err);
 // Writes `size` bytes of `data` to the open file; a short write is carried on, a signal is waited out. TAL_IO.
 tal_status tal_file_put(int fd, const char *path, const void *data, size_t size, tal_error *err);
 // Replaces the file `path` by size bytes: temporary name path.tmp, fsync, rename, fsync of the folder. Killed at any
-// moment, the old or the new file is there, whole. previous, when not NULL: the name the old file is kept under; killed
-// between the two renames, only `previous` is there. On failure (TAL_IO) the old file is untouched.
+// moment, the old or the new file is there, whole. previous, when not NULL: the name the old file is kept under; on a
+// file system without hard links a kill may leave only `previous`. On failure (TAL_IO) the old file is there, whole.
 tal_status tal_file_replace(const char *path, const char *previous, const void *data, size_t size, tal_error *err);
 // Reads a whole file; *data is the caller's to free, NULL on failure (TAL_IO).
 tal_status tal_file_read(const char *path, unsigned char **data, size_t *size, tal_error *err);

@@ -106,6 +106,8 @@ void tal_implicit_observe(struct tal_sim *sim);
 void tal_implicit_answer(struct tal_sim *sim);
 // Brings the slots' histories up to date, for a checkpoint or a new list.
 void tal_implicit_save(struct tal_sim *sim);
+// Takes over the walls' friction from the slots of the list there is.
+void tal_implicit_take_friction(struct tal_sim *sim);
 
 // Lanes for the slots of the present neighbour list: colours, and what does not change until the next list.
 void tal_implicit_list(struct tal_sim *sim);

@@ -243,6 +243,12 @@ void tal_implicit_list(tal_sim *sim) {
   s->listed = sim->neighbours.rebuilds;
 }
 
+void tal_implicit_take_friction(tal_sim *sim) {
+  const tal_implicit *s = &sim->implicit;
+  for (size_t c = 0; s->listed == sim->neighbours.rebuilds && c < s->wall_lanes; c++)
+    s->lane.friction[s->wall_lane[c]] = sim->wall_contacts.friction[c];
+}
+
 void tal_implicit_save(tal_sim *sim) {
   const tal_implicit *s = &sim->implicit;
   const tal_implicit_lanes *m = &s->lane;

@@ -154,10 +154,10 @@ static void put_rows(FILE *out, const listing *list) {
 static tal_status write_table(const listing *list, const char *csv, tal_error *err) {
   char *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   put_header(out, list);
   put_rows(out, list);
-  fclose(out);
+  tal_text_end(out);
   tal_status status = tal_file_replace(csv, NULL, text, size, err);
   free(text);
   return status;

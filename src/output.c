@@ -1,6 +1,7 @@
 // The folder of a run: who may write there, what a new run and a resumed one find. See output.h.
 #include "output_parts.h"
 
+#include "store.h"
 #include <errno.h>
 #include <fcntl.h>
 #include <stdlib.h>
@@ -137,15 +138,27 @@ static bool is_intact(const char *checkpoint) {
   return intact;
 }
 
-// Adds to the sentence on a bad checkpoint whether the one before could serve.
-static tal_status offer_previous(const char *dir, const char *bad, const tal_error *why, tal_error *err) {
+static bool is_sealed(const char *checkpoint) {
+  tal_store store;
+  const bool sealed = tal_store_open(&store, checkpoint, NULL) == TAL_OK;
+  if (sealed)
+    tal_store_close(&store);
+  return sealed;
+}
+
+// Adds to the sentence on a bad checkpoint whether the one before could serve; where it is another version's, so is the
+// one before.
+static tal_status offer_previous(const char *dir, const char *bad, tal_status status, const tal_error *why,
+                                 tal_error *err) {
   char previous[TAL_PATH_SIZE];
   tal_file_path(previous, dir, previous_name);
   if (strcmp(bad, previous) != 0 && is_intact(previous)) {
-    return tal_fail(err, TAL_BAD_INPUT, "%.800s; %s is intact: move it to %s to go on from there", why->text,
-                    previous_name, checkpoint_name);
+    return tal_fail(err, status, "%.800s; %s is intact: move it to %s to go on from there", why->text, previous_name,
+                    checkpoint_name);
   }
-  return tal_fail(err, TAL_BAD_INPUT, "%.800s; there is no intact %s", why->text, previous_name);
+  if (is_sealed(bad))
+    return tal_fail(err, status, "%s", why->text);
+  return tal_fail(err, status, "%.800s; there is no intact %s", why->text, previous_name);
 }
 
 static tal_status check_files(const tal_output *output, tal_error *err) {
@@ -161,18 +174,19 @@ static tal_status cut_back(tal_output *output, tal_error *err) {
   tal_status status = tal_csv_resume_all(output, &output->files, err);
   if (status != TAL_OK)
     return status;
-  tal_fields_drop_later(output);
-  if (output->files.frame_count == 0)
-    return TAL_OK;
-  status = tal_fields_index(output, err);
-  return status == TAL_OK ? tal_xdmf_write(output, err) : status;
+  if (output->files.frame_count > 0) { // the lists first: killed here, none names a frame that is gone
+    status = tal_fields_index(output, err);
+    if (status == TAL_OK)
+      status = tal_xdmf_write(output, err);
+  }
+  return status == TAL_OK ? tal_fields_drop_later(output, err) : status;
 }
 
 static tal_status resume_files(tal_output *output, const char *checkpoint, tal_sim *sim, tal_error *err) {
   tal_error why = {""};
   tal_status status = tal_checkpoint_read(checkpoint, sim, output->scene_text, &output->files, &why);
-  if (status == TAL_BAD_INPUT && !is_intact(checkpoint))
-    return offer_previous(output->dir, checkpoint, &why, err);
+  if (status != TAL_OK && !is_intact(checkpoint))
+    return offer_previous(output->dir, checkpoint, status, &why, err);
   if (status != TAL_OK)
     return tal_fail(err, status, "%s", why.text);
   status = check_files(output, err);

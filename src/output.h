@@ -45,6 +45,8 @@ tal_status tal_output_create(tal_output **output, const char *dir, const tal_sce
 // checkpoint.prev.h5 is the one to go on from. The last checkpoint of a run must come after its last row and frame.
 tal_status tal_output_resume(tal_output **output, const char *dir, const tal_scene *scene, tal_sim *sim, bool *finished,
                              tal_error *err);
+// Does run.json say that the run is done? Not after a kill between the last checkpoint and the last report.
+bool tal_output_reported_done(const tal_output *output);
 // Brings the index files up to date; everything else is on disk since the last checkpoint or report. NULL is fine.
 void tal_output_close(tal_output *output);
 // The stages [scene->stage_count] as the parts of the run before this one left them: wall time and steps from run.json,

@@ -246,11 +246,14 @@ tal_status tal_fields_check(const char *dir, const tal_run_files *files, tal_err
   return TAL_OK;
 }
 
-void tal_fields_drop_later(const tal_output *output) {
+tal_status tal_fields_drop_later(const tal_output *output, tal_error *err) {
   char folder[TAL_PATH_SIZE], path[TAL_PATH_SIZE];
   tal_file_path(folder, output->dir, "fields");
   DIR *entries = opendir(folder);
-  for (struct dirent *entry; entries && (entry = readdir(entries));) {
+  if (!entries)
+    return tal_fail(err, TAL_IO, "%s: cannot be read: %s", folder, strerror(errno));
+  tal_status status = TAL_OK;
+  for (struct dirent *entry; (entry = readdir(entries));) {
     char *end;
     size_t frame = strtoul(entry->d_name, &end, 10);
     bool unfinished = strcmp(end, ".h5.tmp") == 0,
@@ -258,8 +261,9 @@ void tal_fields_drop_later(const tal_output *output) {
     if (end == entry->d_name || !(unfinished || later))
       continue;
     tal_file_path(path, folder, entry->d_name);
-    unlink(path);
+    if (unlink(path) != 0)
+      status = tal_fail(err, TAL_IO, "%s: cannot be removed: %s", path, strerror(errno));
   }
-  if (entries)
-    closedir(entries);
+  closedir(entries);
+  return status;
 }

@@ -39,7 +39,7 @@ extern const char tal_tracks_header[];
 // output_fields.c: the path of frame k ("fields/000012.h5"), the index fields.h5, what is there beyond the checkpoint.
 #define TAL_FRAME_NAME "fields/%06zu.h5"
 tal_status tal_fields_check(const char *dir, const tal_run_files *files, tal_error *err);
-void tal_fields_drop_later(const tal_output *output);
+tal_status tal_fields_drop_later(const tal_output *output, tal_error *err);
 tal_status tal_fields_index(tal_output *output, tal_error *err);
 // output_xdmf.c: fields.xdmf for all frames.
 tal_status tal_xdmf_write(tal_output *output, tal_error *err);

@@ -67,15 +67,16 @@ static bool load_document(yaml_document_t *document, const void *text, size_t si
   return false;
 }
 
-static void put_scene(tal_json *json, const char *text) {
+// False: no memory for the document, as the text itself is well-formed.
+static bool put_scene(tal_json *json, const char *text) {
   yaml_document_t document;
-  if (load_document(&document, text, strlen(text))) {
+  const bool loaded = load_document(&document, text, strlen(text));
+  if (loaded) {
     put_node(json, "scene", &document, 1);
     yaml_document_delete(&document);
-  } else {
-    tal_json_literal(json, "scene", "null");
   }
   tal_json_text(json, "scene_text", text);
+  return loaded;
 }
 
 // ---- the report ----
@@ -137,7 +138,7 @@ tal_status tal_output_report(tal_output *output, const tal_sim *sim, const tal_r
   char path[TAL_PATH_SIZE], *text = NULL;
   size_t size = 0;
   tal_file_path(path, output->dir, "run.json");
-  tal_json json = {.out = open_memstream(&text, &size)};
+  tal_json json = {.out = tal_text_begin(&text, &size)};
   tal_json_open(&json, NULL, '{');
   tal_json_text(&json, "name", sim->scene->name);
   tal_json_text(&json, "status", report->status);
@@ -146,11 +147,11 @@ tal_status tal_output_report(tal_output *output, const tal_sim *sim, const tal_r
   put_warnings(&json, report);
   put_stages(&json, report);
   put_packing(&json, sim);
-  put_scene(&json, output->scene_text);
+  const bool whole = put_scene(&json, output->scene_text);
   tal_json_close(&json, '}');
-  tal_status status = fclose(json.out) == 0 ? TAL_OK : tal_fail(err, TAL_IO, "%s: no memory for it", path);
-  if (status == TAL_OK)
-    status = tal_file_replace(path, NULL, text, size, err);
+  tal_text_end(json.out);
+  tal_status status = whole ? tal_file_replace(path, NULL, text, size, err)
+                            : tal_fail(err, TAL_IO, "%s: no memory for the scene", path);
   free(text);
   return status;
 }
@@ -188,6 +189,24 @@ static void read_stages(yaml_document_t *document, tal_stage_report *before, siz
     before[k].cpu_time = number(member(document, stage, "cpu_time"));
     before[k].grain_steps_per_second = number(member(document, stage, "grain_steps_per_second"));
   }
+}
+
+bool tal_output_reported_done(const tal_output *output) {
+  char path[TAL_PATH_SIZE];
+  unsigned char *text;
+  size_t size;
+  yaml_document_t document;
+  bool done = false;
+  tal_file_path(path, output->dir, "run.json");
+  if (tal_file_read(path, &text, &size, NULL) != TAL_OK)
+    return false;
+  if (load_document(&document, text, size)) {
+    const yaml_node_t *status = member(&document, yaml_document_get_root_node(&document), "status");
+    done = status && status->type == YAML_SCALAR_NODE && strcmp((const char *)status->data.scalar.value, "done") == 0;
+    yaml_document_delete(&document);
+  }
+  free(text);
+  return done;
 }
 
 void tal_report_read(const char *dir, tal_stage_report *before, size_t stage_count) {

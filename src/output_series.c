@@ -23,13 +23,13 @@ char *tal_series_header(void) {
   };
   char *text = NULL;
   size_t size = 0;
-  FILE *stream = open_memstream(&text, &size);
+  FILE *stream = tal_text_begin(&text, &size);
   for (size_t k = 0; k < sizeof names / sizeof *names; k++) {
     const char *const format = *names[k][1] ? "%s%s[%s]" : "%s%s";
     fprintf(stream, format, k ? "," : "", names[k][0], names[k][1]);
   }
   fputc('\n', stream);
-  fclose(stream);
+  tal_text_end(stream);
   return text;
 }
 
@@ -132,9 +132,8 @@ static void put_number(FILE *stream, char before, double value) {
 
 // Ends the text stream and appends what it holds as the rows of `step`.
 static tal_status append_rows(tal_csv *csv, FILE *stream, char **text, size_t *size, int64_t step, tal_error *err) {
-  tal_status status = fclose(stream) == 0 ? TAL_OK : tal_fail(err, TAL_IO, "%s: no memory for a row", csv->path);
-  if (status == TAL_OK)
-    status = append(csv, *text, *size, err);
+  tal_text_end(stream);
+  tal_status status = append(csv, *text, *size, err);
   if (status == TAL_OK)
     csv->step = step;
   free(*text);
@@ -146,7 +145,7 @@ tal_status tal_output_row(tal_output *output, const tal_row *row, tal_error *err
     return TAL_OK;
   char *text = NULL, before = 0;
   size_t size = 0;
-  FILE *stream = open_memstream(&text, &size);
+  FILE *stream = tal_text_begin(&text, &size);
   // `step` and `stage` come out as whole numbers: %.17g writes them so below 1e17.
 #define X(name, unit, meaning)                                                                                         \
   put_number(stream, before, row->name);                                                                               \
@@ -176,7 +175,7 @@ tal_status tal_output_tracks(tal_output *output, const tal_sim *sim, tal_error *
     return status;
   char *text = NULL;
   size_t size = 0;
-  FILE *stream = open_memstream(&text, &size);
+  FILE *stream = tal_text_begin(&text, &size);
   int32_t *index = tal_order_of_ids(&sim->grains);
   for (size_t k = 0; k < wanted->track_count; k++)
     put_track(stream, sim->run.time, &sim->grains, (size_t)index[wanted->tracks[k]]);

@@ -86,12 +86,11 @@ static void put_document(FILE *out, const tal_run_files *files) {
 tal_status tal_xdmf_write(tal_output *output, tal_error *err) {
   char path[TAL_PATH_SIZE], *text = NULL;
   size_t size = 0;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   tal_file_path(path, output->dir, "fields.xdmf");
   put_document(out, &output->files);
-  tal_status status = fclose(out) == 0 ? TAL_OK : tal_fail(err, TAL_IO, "%s: no memory for it", path);
-  if (status == TAL_OK)
-    status = tal_file_replace(path, NULL, text, size, err);
+  tal_text_end(out);
+  tal_status status = tal_file_replace(path, NULL, text, size, err);
   free(text);
   if (status == TAL_OK)
     output->listed_frames = output->files.frame_count;

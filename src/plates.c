@@ -56,6 +56,17 @@ void tal_plates_drive(tal_sim *sim, double speed) {
   }
 }
 
+void tal_plates_rub(tal_sim *sim, double friction) {
+  tal_wall *bottom = tal_walls_plate(&sim->walls, +1), *top = tal_walls_plate(&sim->walls, -1);
+  if (bottom->friction == friction && top->friction == friction)
+    return;
+  bottom->friction = top->friction = friction;
+  tal_contacts *slots = &sim->wall_contacts;
+  for (size_t c = 0; c < slots->count; c++)
+    slots->friction[c] = sim->walls.wall[slots->j[c]].friction;
+  tal_implicit_take_friction(sim);
+}
+
 void tal_plates_slide(tal_sim *sim, double speed_limit) {
   tal_wall *bottom = tal_walls_plate(&sim->walls, +1), *top = tal_walls_plate(&sim->walls, -1);
   const double mass = sqrt((double)sim->grains.count) * sim->constants.mean_mass;

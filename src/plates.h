@@ -15,6 +15,8 @@ void tal_plates_drive(tal_sim *sim, double speed);
 // Force servo, eq (23): each plate moves so that its load tends to `pressure` h times the width of the loop between the
 // ends of the arcs at that plate. speed_limit [m/s].
 void tal_plates_servo(tal_sim *sim, double pressure, double speed_limit);
+// Sets the friction between plates and grains, in the contacts that are listed too.
+void tal_plates_rub(tal_sim *sim, double friction);
 // The plates slide sideways, against each other: each is as heavy as a row of grains, their friction drives them. What
 // pushes both the same way holds. speed_limit [m/s].
 void tal_plates_slide(tal_sim *sim, double speed_limit);

@@ -87,9 +87,9 @@ static tal_status write_table(const tal_rotations *all, const char *folder, cons
                               void (*fill)(FILE *out, const tal_rotations *all), tal_error *err) {
   char path[TAL_PATH_SIZE], *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   fill(out, all);
-  fclose(out);
+  tal_text_end(out);
   tal_file_path(path, folder, name);
   tal_status status = tal_file_replace(path, NULL, text, size, err);
   free(text);
@@ -166,11 +166,11 @@ static void say_all(FILE *out, const tal_rotations *all, double reach) {
 char *tal_rotations_text(const tal_rotations *all, const tal_rotation_options *options) {
   char *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   if (all->count == 1)
     say_one(out, &all->item[0], options->reach);
   else
     say_all(out, all, options->reach);
-  fclose(out);
+  tal_text_end(out);
   return text;
 }

@@ -19,7 +19,7 @@
 #include <stdlib.h>
 #include <time.h>
 
-// Set by the handler of SIGINT, SIGTERM and SIGUSR1; a signal has no other way to reach a loop.
+// Set by the handler of SIGINT, SIGTERM, SIGUSR1 and SIGHUP; a signal has no other way to reach a loop.
 static volatile sig_atomic_t asked_to_stop;
 
 static void ask_to_stop(int number) {
@@ -34,6 +34,10 @@ static void catch_signals(void) {
   sigaction(SIGINT, &action, NULL);
   sigaction(SIGTERM, &action, NULL);
   sigaction(SIGUSR1, &action, NULL);
+  struct sigaction before;
+  if (sigaction(SIGHUP, NULL, &before) == 0 && before.sa_handler != SIG_IGN) // else nohup: it is to go on
+    sigaction(SIGHUP, &action, NULL);
+  signal(SIGXFSZ, SIG_IGN); // a file beyond the limit is a write that fails and says so
 }
 
 static double clock_read(clockid_t clock) {
@@ -293,6 +297,15 @@ static tal_status run_opened(job *this, const tal_run_options *options, tal_run_
   return status;
 }
 
+// The run was killed between its last checkpoint and its last report.
+static tal_status report_late(job *this, tal_error *err) {
+  begin_accounts(this);
+  tal_sim_row(this->sim, &this->row);
+  tal_status status = report_run(this, "done", "", err);
+  free(this->stages);
+  return status;
+}
+
 // A thousand grains wait longer for a second thread than it saves. OMP_NUM_THREADS is the limit where it is set.
 int tal_run_threads(size_t grains, int asked) {
   int useful = 1 + (int)(grains / 2000), there = omp_get_max_threads();
@@ -340,12 +353,14 @@ tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options,
     status = tal_run_from(run.sim, options->from, err);
   if (status == TAL_OK)
     run.cores = tal_run_threads(run.sim->grains.count, options->threads);
-  if (status == TAL_OK)
-    status = open_output(&run, options, &result->already_done, err);
-  if (status == TAL_OK && !result->already_done) {
+  if (status == TAL_OK) {
     catch_signals();
-    status = run_opened(&run, options, result, err);
+    status = open_output(&run, options, &result->already_done, err);
   }
+  if (status == TAL_OK && !result->already_done)
+    status = run_opened(&run, options, result, err);
+  else if (status == TAL_OK && !tal_output_reported_done(run.output))
+    status = report_late(&run, err);
   if (run.output)
     tal_output_close(run.output);
   tal_sim_free(run.sim);

@@ -26,7 +26,7 @@ int tal_run_threads(size_t grains, int asked);
 // same but for its further stages. TAL_BAD_INPUT when it is no such run, or damaged; TAL_IO.
 tal_status tal_run_from(tal_sim *sim, const char *path, tal_error *err);
 // Runs the scene into options->dir. Returns TAL_OK, TAL_BAD_INPUT, TAL_INVALID (the last good checkpoint stays),
-// TAL_IO, or TAL_INTERRUPTED after SIGINT, SIGTERM or SIGUSR1 (checkpoint written), with one sentence in err.
+// TAL_IO, or TAL_INTERRUPTED after SIGINT, SIGTERM, SIGUSR1 or SIGHUP (checkpoint written), with one sentence in err.
 tal_status tal_run_scene(const tal_scene *scene, const tal_run_options *options, tal_run_result *result,
                          tal_error *err);
 

@@ -186,15 +186,11 @@ static void write_group(FILE *out, const tal_key *keys, const char *base, int in
 char *tal_scene_text(const tal_scene *scene) {
   char *text = NULL;
   size_t size = 0;
-  FILE *out = open_memstream(&text, &size);
-  if (!out) {
-    fprintf(stderr, "talus: out of memory\n");
-    exit(TAL_IO);
-  }
+  FILE *out = tal_text_begin(&text, &size);
   locale_t plain = newlocale(LC_NUMERIC_MASK, "C", (locale_t)0), before = uselocale(plain);
   write_group(out, tal_schema(), (const char *)scene, 0, false);
   uselocale(before);
   freelocale(plain);
-  fclose(out);
+  tal_text_end(out);
   return text;
 }

@@ -51,8 +51,7 @@ static void before_step(tal_sim *sim, const tal_scene_stage *plan) {
   const double speed_limit = 0.1 * tal_plates_distance(sim) / plan->ramp;
   tal_plates_servo(sim, sim->run.pressure, speed_limit);
   tal_plates_slide(sim, speed_limit);
-  for (int side = 1; side >= -1; side -= 2)
-    tal_walls_plate(&sim->walls, side)->friction = sim->run.released ? 0 : tal_step_plate_friction(sim, plan);
+  tal_plates_rub(sim, sim->run.released ? 0 : tal_step_plate_friction(sim, plan));
 }
 
 // Mean of m |dv| / window over the free grains, over the mean contact force of this instant.

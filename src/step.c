@@ -36,8 +36,12 @@ static bool any_held_motion(const tal_grains *g) {
   return false;
 }
 
+// The plates' that the stage asks for counts, were they smooth just now.
 static bool any_friction(const tal_sim *sim) {
+  const tal_scene_stage *plan = tal_sim_stage(sim);
   if (sim->friction > 0)
+    return true;
+  if (plan && tal_walls_plate(&sim->walls, +1) && tal_step_plate_friction(sim, plan) > 0)
     return true;
   for (size_t w = 0; w < sim->walls.count; w++)
     if (sim->walls.wall[w].friction > 0)

@@ -55,18 +55,18 @@ static void put_command(FILE *out, const tal_study *study, const tal_study_run *
 
 static char *commands_text(const tal_study *study, const char *dir, size_t *size) {
   char *text = NULL;
-  FILE *out = open_memstream(&text, size);
+  FILE *out = tal_text_begin(&text, size);
   for (size_t r = 0; r < study->run_count; r++) {
     put_command(out, study, &study->runs[r], dir);
     fputc('\n', out);
   }
-  fclose(out);
+  tal_text_end(out);
   return text;
 }
 
 static char *plan_text(const tal_study *study, const char *dir, size_t *size) {
   char *text = NULL;
-  FILE *out = open_memstream(&text, size);
+  FILE *out = tal_text_begin(&text, size);
   fputs("id,scene_hash,seed,nominal_steps,setting", out);
   for (size_t d = 0; d < study->dial_count; d++) {
     fputc(',', out);
@@ -86,14 +86,14 @@ static char *plan_text(const tal_study *study, const char *dir, size_t *size) {
     fputc(',', out);
     char *command = NULL;
     size_t length;
-    FILE *line = open_memstream(&command, &length);
+    FILE *line = tal_text_begin(&command, &length);
     put_command(line, study, run, dir);
-    fclose(line);
+    tal_text_end(line);
     tal_words_csv(out, command);
     free(command);
     fputc('\n', out);
   }
-  fclose(out);
+  tal_text_end(out);
   return text;
 }
 

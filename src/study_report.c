@@ -173,9 +173,9 @@ static void put_sentence(FILE *out, const tal_study_summary *s) {
 char *tal_study_sentence(const tal_study_summary *summary) {
   char *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   put_sentence(out, summary);
-  fclose(out);
+  tal_text_end(out);
   return text;
 }
 
@@ -222,7 +222,7 @@ char *tal_study_report(const tal_study_summary *summary) {
   const tal_study *study = summary->study;
   char *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   fprintf(out, "%s: %zu of %zu runs done, %zu failed, %zu unfinished or missing; reference %s\n", study->name,
           summary->done, study->run_count, summary->failed, summary->unfinished,
           study->settings[study->reference_setting].label);
@@ -231,6 +231,6 @@ char *tal_study_report(const tal_study_summary *summary) {
     put_metric(out, summary, m);
   fputs("(* on the frontier of error against cost; +- one standard error; excl.: a larger bias is excluded)\n\n", out);
   put_sentence(out, summary);
-  fclose(out);
+  tal_text_end(out);
   return text;
 }

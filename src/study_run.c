@@ -23,7 +23,8 @@
 enum { BAR = 20 };
 static const double patience = 10; // [s] for runs that another process is at work on
 
-static const int stopping[] = {SIGINT, SIGTERM, SIGUSR1};
+static const int stopping[] = {SIGINT, SIGTERM, SIGUSR1, SIGHUP};
+enum { STOPPING = sizeof stopping / sizeof *stopping };
 
 static volatile sig_atomic_t asked_to_stop;
 
@@ -48,7 +49,7 @@ typedef struct crew {
   double steps_ended, steps_todo;
   double started, shown; // [s]
   bool on_terminal;
-  struct sigaction old[3];
+  struct sigaction old[STOPPING];
 } crew;
 
 static double now(void) {
@@ -301,12 +302,15 @@ static void catch_signals(crew *this) {
   struct sigaction action = {.sa_handler = ask_to_stop};
   sigemptyset(&action.sa_mask);
   asked_to_stop = 0;
-  for (int k = 0; k < 3; k++)
+  for (int k = 0; k < STOPPING; k++) {
     sigaction(stopping[k], &action, &this->old[k]);
+    if (stopping[k] == SIGHUP && this->old[k].sa_handler == SIG_IGN) // nohup: it is to go on
+      sigaction(SIGHUP, &this->old[k], NULL);
+  }
 }
 
 static void release_signals(const crew *this) {
-  for (int k = 0; k < 3; k++)
+  for (int k = 0; k < STOPPING; k++)
     sigaction(stopping[k], &this->old[k], NULL);
 }
 

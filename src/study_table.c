@@ -96,9 +96,9 @@ static tal_status write_table(const tal_study_summary *s, const char *name,
                               void (*put)(FILE *, const tal_study_summary *), tal_error *err) {
   char path[TAL_PATH_SIZE], *text = NULL;
   size_t size;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   put(out, s);
-  fclose(out);
+  tal_text_end(out);
   tal_file_path(path, s->dir, name);
   tal_status status = tal_file_replace(path, NULL, text, size, err);
   free(text);

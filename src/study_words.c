@@ -50,21 +50,24 @@ static void put_node(FILE *out, const tal_node *node) {
 const char *tal_words_of_node(tal_tree *tree, const tal_node *node) {
   char *text = NULL;
   size_t size = 0;
-  FILE *out = open_memstream(&text, &size);
+  FILE *out = tal_text_begin(&text, &size);
   put_node(out, node);
-  fclose(out);
+  tal_text_end(out);
   const char *copy = tal_tree_copy(tree, text, size);
   free(text);
   return copy;
 }
 
 const char *tal_words_format(tal_tree *tree, const char *format, ...) {
-  char *text = NULL;
+  char *text;
+  size_t size;
+  FILE *out = tal_text_begin(&text, &size);
   va_list args;
   va_start(args, format);
-  const int length = vasprintf(&text, format, args);
+  vfprintf(out, format, args);
   va_end(args);
-  const char *copy = tal_tree_copy(tree, length > 0 ? text : "", length > 0 ? (size_t)length : 0);
+  tal_text_end(out);
+  const char *copy = tal_tree_copy(tree, text, size);
   free(text);
   return copy;
 }

@@ -20,6 +20,7 @@ typedef struct checker {
   void *context;
   tal_verify_counts *counts;
   int64_t series_bytes, tracks_bytes; // lengths found
+  int64_t series_kept, tracks_kept;   // --resume cuts them back to these, INT64_MAX: it does not
   size_t frame_files;                 // fields/NNNNNN.h5 numbered without a gap from 0
 } checker;
 
@@ -47,7 +48,10 @@ typedef struct row_rule {
   const char *header; // expected, with its line end
   size_t step_column; // 0: none
   size_t same_time;   // rows that share one time
+  int64_t kept;       // bytes that --resume keeps
 } row_rule;
+
+static const char mends[] = "; --resume mends it";
 
 typedef struct row_state {
   size_t row;
@@ -107,17 +111,19 @@ static void check_lines(checker *c, const row_rule *rule, char *text, size_t siz
     return;
   }
   row_state state = {0, 0, 0};
+  bool mended = false; // a kill in the middle of a row
   for (char *line = text + header; *line;) {
     char *end = strchr(line, '\n');
+    mended = line - text >= rule->kept;
     if (!end) {
-      report(c, true, "%s:%zu: the last line is torn", rule->name, state.row + 2);
+      report(c, !mended, "%s:%zu: the last line is torn%s", rule->name, state.row + 2, mended ? mends : "");
       return;
     }
     check_row(c, rule, &state, line, columns);
     line = end + 1;
   }
   if (state.row % rule->same_time)
-    report(c, true, "%s: the last time lacks some grains", rule->name);
+    report(c, !mended, "%s: the last time lacks some grains%s", rule->name, mended ? mends : "");
 }
 
 // Returns the length of the file, -1 when it cannot be read.
@@ -152,14 +158,29 @@ static size_t tracks_per_time(const checker *c) {
   return rows ? rows : 1;
 }
 
+// What an unfinished run goes on from.
+static void find_kept(checker *c) {
+  char path[TAL_PATH_SIZE];
+  tal_checkpoint_head head;
+  c->series_kept = c->tracks_kept = INT64_MAX;
+  tal_file_path(path, c->dir, is_there(c, "checkpoint.h5") ? "checkpoint.h5" : "checkpoint.prev.h5");
+  if (tal_checkpoint_peek(path, &head, NULL) != TAL_OK)
+    return;
+  if (!head.complete) {
+    c->series_kept = head.files.series_bytes;
+    c->tracks_kept = head.files.tracks_bytes;
+  }
+  tal_run_files_clear(&head.files);
+}
+
 static void check_tables(checker *c) {
   char *header = tal_series_header();
-  const row_rule series = {"series.csv", header, 1, 1};
+  const row_rule series = {"series.csv", header, 1, 1, c->series_kept};
   c->series_bytes = check_csv(c, &series);
   free(header);
   if (!is_there(c, "tracks.csv"))
     return;
-  const row_rule tracks = {"tracks.csv", tal_tracks_header, 0, tracks_per_time(c)};
+  const row_rule tracks = {"tracks.csv", tal_tracks_header, 0, tracks_per_time(c), c->tracks_kept};
   c->tracks_bytes = check_csv(c, &tracks);
 }
 
@@ -323,6 +344,7 @@ tal_status tal_verify(const char *dir, tal_finding *finding, void *context, tal_
     return tal_fail(err, TAL_BAD_INPUT, "%s holds no run", dir);
   }
   check_lock(&c);
+  find_kept(&c);
   check_tables(&c);
   check_frames(&c);
   check_index(&c);

@@ -28,6 +28,36 @@ static engine *start(const char *text) {
 
 // ---- stages ----
 
+// EXACT: the plates of a confinement that rests under stresses that differ are smooth for a window, in every contact
+// from the very next step on, and rough again after it.
+static void smooth_for_a_window(void **state) {
+  (void)state;
+  static const char *const schemes[] = {"verlet", "implicit_friction"};
+  for (int s = 0; s < 2; s++) {
+    draft *d = draft_begin();
+    fprintf(d->to,
+            "grains: {count: 16, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+            "material: {young: 30e9, density: 2675, friction: 0.45, damping: 0.002}\nmass_scaling: 1e5\n"
+            "contact: {vR: 1e-4}\npack: {method: drop_and_roll, width: 6e-3}\n"
+            "integrator: {scheme: %s, dt: 1e-5}\nstages: [{kind: confine, pressure: 100e3, ramp: 1e-3, "
+            "friction: 0.1, tolerance: 0.9, unbalanced: 100}]\n",
+            schemes[s]);
+    engine *e = engine_start(d);
+    int smooth = 0, rough = 0;
+    for (int64_t released = 0; !tal_sim_done(e->sim); released = e->sim->run.released) {
+      engine_step(e);
+      const tal_contacts *slots = &e->sim->wall_contacts;
+      for (size_t c = 0; c < slots->count; c++) {
+        const bool slides = slots->friction[c] == 0 && slots->ft[c] == 0;
+        assert_true(released ? slides : slots->friction[c] == 0.1);
+        *(released ? &smooth : &rough) += slots->overlap[c] > 0;
+      }
+    }
+    assert_true(smooth > 10 && rough > 100);
+    engine_end(e);
+  }
+}
+
 // EXACT: a free stage takes round(duration/dt) steps, and its time is the start plus that many steps.
 static void number_of_steps(void **state) {
   (void)state;
@@ -340,7 +370,7 @@ int main(void) {
       cmocka_unit_test(number_of_steps),      cmocka_unit_test(stage_after_stage),
       cmocka_unit_test(rows_of_the_series),   cmocka_unit_test(ballistic_flight),
       cmocka_unit_test(own_mass_and_inertia), cmocka_unit_test(invalid_runs),
-      cmocka_unit_test(refused_at_the_start),
+      cmocka_unit_test(refused_at_the_start), cmocka_unit_test(smooth_for_a_window),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
