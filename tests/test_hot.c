@@ -46,7 +46,8 @@ static void test_widths(void **state) {
   (void)state;
   static const char *const widths[] = {"v3", "v4"};
   static const char *const scenes[] = {
-      "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\nintegrator: {dt: 1e-3, force: true}\n",
+      "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\nintegrator: {dt: 1e-3, force: "
+      "true}\n",
       "contact: {normal: hertz, tangential: spring}\nintegrator: {dt: 1e-3, force: true}\n",
       "contact: {normal: linear, tangential: none, stiffness: 1e4}\nintegrator: {dt: 1e-3, force: true}\n",
       "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\n"
