@@ -19,11 +19,11 @@ static engine *crowd(const char *rest) {
   draft *d = draft_begin();
   fputs("grains:\n  thickness: 1\n  list:\n", d->to);
   for (int k = 0; k < GRAINS; k++)
-    fprintf(d->to, "  - {x: %.17g, y: %.17g, r: %.17g, vx: %.17g, vy: %.17g, fixed: %s}\n", 1.6 * (k % COLUMNS + 0.5),
-            1.6 * (k / COLUMNS + 0.5) + 0.05 * (k % 5), 0.7 + 0.3 * sin(k), 5 * sin(2 * k), 5 * cos(3 * k),
+    fprintf(d->to, "  - {x: %.17g, y: %.17g, r: %.17g, vx: %.17g, vy: %.17g, fixed: %s}\n", 1.7 * (k % COLUMNS + 0.5),
+            1.7 * (k / COLUMNS + 0.5) + 0.05 * (k % 5), 0.85 + 0.1 * sin(k), 2 * sin(2 * k), 2 * cos(3 * k),
             k % 97 == 5 ? "true" : "false");
   fprintf(d->to,
-          "material: {young: 1e5, density: 1, friction: 0.5}\ngravity: [-2, -9]\nlimits: {overlap: 1}\n"
+          "material: {young: 1e6, density: 1, friction: 0.5}\ngravity: [-2, -9]\nlimits: {overlap: 1}\n"
           "walls: [{from: [-1, -0.5], to: [40, -0.5]}, {from: [-0.5, 0], to: [-0.5, 50]}]\n"
           "stages: [{kind: free, duration: 10}]\n%s",
           rest);
@@ -46,12 +46,12 @@ static void test_widths(void **state) {
   (void)state;
   static const char *const widths[] = {"v3", "v4"};
   static const char *const scenes[] = {
-      "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\nintegrator: {dt: 1e-3, force: "
+      "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\nintegrator: {dt: 4e-4, force: "
       "true}\n",
-      "contact: {normal: hertz, tangential: spring}\nintegrator: {dt: 1e-3, force: true}\n",
-      "contact: {normal: linear, tangential: none, stiffness: 1e4}\nintegrator: {dt: 1e-3, force: true}\n",
+      "contact: {normal: hertz, tangential: spring}\nintegrator: {dt: 4e-4, force: true}\n",
+      "contact: {normal: linear, tangential: none, stiffness: 1e5}\nintegrator: {dt: 4e-4, force: true}\n",
       "contact: {normal: hertz, tangential: regularised, exponent: 20, vR: 0.01}\n"
-      "integrator: {scheme: implicit_friction, dt: 1e-3, force: true}\n"};
+      "integrator: {scheme: implicit_friction, dt: 4e-4, force: true}\n"};
   for (size_t s = 0; s < sizeof scenes / sizeof *scenes; s++)
     for (size_t w = 0; w < sizeof widths / sizeof *widths; w++) {
       engine *base = crowd(scenes[s]), *wide = crowd(scenes[s]);
