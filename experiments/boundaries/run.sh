@@ -16,8 +16,10 @@ run() { # folder, scene file, settings...
   shift 2
   resume=
   if [ -e "$folder/checkpoint.h5" ]; then resume=--resume; fi
+  # a run that went bad says why and leaves what it has; the others go on
   # shellcheck disable=SC2086 # words
-  "$talus" run "$here/$file" -o "$folder" -t "${THREADS:-1}" -q --no-figures $resume "$@" $short
+  "$talus" run "$here/$file" -o "$folder" -t "${THREADS:-1}" -q --no-figures $resume "$@" $short ||
+    { [ $? = 3 ] && [ -z "$short" ]; }
 }
 
 # shellcheck disable=SC2086 # words
