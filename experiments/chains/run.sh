@@ -19,7 +19,7 @@ run() { # folder, settings...
 
 if [ "${1:-}" = --short ]; then
   trap 'rm -rf "$out"' EXIT
-  run small-1 -q --set grains.count=150 --set pack.width=13e-3 --set stages.0.ramp=1 --set stages.1.strain=0.01 \
+  run small-1 -q --set seed=2 --set grains.count=150 --set pack.width=13e-3 --set stages.0.ramp=1 --set stages.1.strain=0.01 \
     --set output.fields_every=0.2
   "$talus" measure "$out/small-1" --at 0.002,peak,last --over 0.002 --export contacts -q
   "$talus" measure "$out/small-1" --region 3e-3:10e-3,5e-3:20e-3 --window 0.002:0.008 -o "$out/inner" --no-figures -q
