@@ -203,7 +203,7 @@ static void print_cost(tal_sim *sim, tal_scene *scene) {
   double rate = measured_rate(sim);
   printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps, 1e-6 * rate * grains,
          steps / rate);
-  tal_check_print_costs(sim, scene, 1 / rate);
+  tal_check_print_costs(scene, 1 / rate);
 }
 
 int tal_cli_check(int argc, char **argv) {

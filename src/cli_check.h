@@ -6,9 +6,8 @@
 
 // The names of the effects in a mask (effects.h), separated by commas.
 void tal_check_effect_names(unsigned effects, char *to, size_t size);
-// One line: what each effect of the present stage costs [ns per grain and step], found by short trials; nothing when
-// the stage ends or goes bad meanwhile. Shortens the steps of `scene`, which is that of `sim`; `step_seconds`: about
-// what a step takes.
-void tal_check_print_costs(tal_sim *sim, tal_scene *scene, double step_seconds);
+// One line: what each effect of the first stage costs [ns per grain and step], found by short trials; nothing when one
+// of them goes bad. Shortens the steps of `scene`; `step_seconds`: about what a step takes.
+void tal_check_print_costs(tal_scene *scene, double step_seconds);
 
 #endif

@@ -1,5 +1,5 @@
 // What each effect of a scene costs per step: a ladder of trials on the packed grains, one effect more on each rung.
-// The rungs are tried in turns, the fastest of each counts. The trial's motion is thrown away with the simulation.
+// The rungs are tried in turns, the fastest of each counts. The trials have a simulation of their own.
 #include "cli_check.h"
 
 #include "effects.h"
@@ -86,17 +86,23 @@ static bool try_rung(tal_sim *sim, rung *r, int steps) {
   return fine;
 }
 
-void tal_check_print_costs(tal_sim *sim, tal_scene *scene, double step_seconds) {
+void tal_check_print_costs(tal_scene *scene, double step_seconds) {
+  tal_sim *sim;
+  tal_error err;
   for (size_t s = 0; s < scene->stage_count; s++)
     scene->stages[s].integrator.dt *= 1e-3; // lest the packing flies apart without an effect
   omp_set_num_threads(1);
+  if (tal_sim_create(&sim, scene, &err))
+    return;
   rung ladder[RUNGS];
   const size_t count = make_rungs(sim->effects, ladder);
   const int steps = (int)fmin(fmax(4e-3 / step_seconds, 2), 1000);
   for (int turn = 0; turn < TURNS; turn++)
     for (size_t k = 0; k < count; k++)
-      if (!try_rung(sim, &ladder[k], steps))
+      if (!try_rung(sim, &ladder[k], steps)) {
+        tal_sim_free(sim);
         return;
+      }
   const double ns = 1e9 / (double)sim->grains.count;
   printf("costs         %.3g ns per grain and step on one core: ", ns * ladder[count - 1].seconds);
   for (size_t k = 0; k < count; k++)
@@ -105,4 +111,5 @@ void tal_check_print_costs(tal_sim *sim, tal_scene *scene, double step_seconds) 
     else
       printf(", %s %+.3g", ladder[k].name, ns * (ladder[k].seconds - ladder[k - 1].seconds));
   printf("\n");
+  tal_sim_free(sim);
 }
