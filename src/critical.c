@@ -21,12 +21,20 @@ double tal_critical_step_pair(double stiffness, double damping, double reduced_m
   return limit(stiffness / reduced_mass, damping / reduced_mass);
 }
 
+typedef struct pair_gap {
+  double reach, square; // sum of the radii; square of the distance
+} pair_gap;
+
 // Of a grain-grain slot, from the centres as they stand.
-static double pair_overlap(const tal_sim *sim, size_t c) {
+static pair_gap pair_of(const tal_sim *sim, size_t c) {
   const tal_grains *g = &sim->grains;
   const int32_t i = sim->pairs.i[c], j = sim->pairs.j[c];
   double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j];
-  return g->r[i] + g->r[j] - sqrt(dx * dx + dy * dy);
+  return (pair_gap){g->r[i] + g->r[j], dx * dx + dy * dy};
+}
+
+static bool touches(pair_gap gap) {
+  return gap.square < gap.reach * gap.reach;
 }
 
 // Tangent stiffness and damping of a touching slot.
@@ -40,65 +48,74 @@ static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, dou
 }
 
 // How much stiffer than the normal spring the tangential one is to grain i, turning included; at least 1.
-static double sideways(const tal_sim *sim, int32_t i) {
+static double sideways(const tal_sim *sim, size_t i) {
   const tal_grains *g = &sim->grains;
-  if (!(sim->effects & TAL_EFFECT_SPRING) || (sim->effects & TAL_EFFECT_IMPLICIT))
-    return 1;
   double turning = sim->effects & TAL_EFFECT_SPIN ? 1 + g->mass[i] * g->r[i] * g->r[i] / g->inertia[i] : 1;
   return fmax(1, sim->constants.tangential_ratio * turning);
 }
 
-static void add_slots(const tal_sim *sim, const tal_contacts *s, bool pairs, double (*sum)[2]) {
+// Tangent stiffness and damping of all contacts of each grain.
+static void add_up(const tal_sim *sim, double (*sum)[2]) {
+  const tal_contacts *s = &sim->pairs, *w = &sim->wall_contacts;
+  double k, d;
   for (size_t c = 0; c < s->count; c++) {
-    double overlap = pairs ? pair_overlap(sim, c) : s->overlap[c], k, d;
-    if (overlap <= 0)
+    const pair_gap gap = pair_of(sim, c);
+    if (!touches(gap))
       continue;
-    int32_t i = s->i[c], j = s->j[c];
-    slot_slopes(sim, s, c, overlap, &k, &d);
-    sum[i][0] += k * sideways(sim, i);
-    sum[i][1] += d;
-    if (!pairs)
-      continue;
-    sum[j][0] += k * sideways(sim, j);
-    sum[j][1] += d;
+    slot_slopes(sim, s, c, gap.reach - sqrt(gap.square), &k, &d);
+    sum[s->i[c]][0] += k;
+    sum[s->i[c]][1] += d;
+    sum[s->j[c]][0] += k;
+    sum[s->j[c]][1] += d;
   }
+  for (size_t c = 0; c < w->count; c++) {
+    if (w->overlap[c] <= 0)
+      continue;
+    slot_slopes(sim, w, c, w->overlap[c], &k, &d);
+    sum[w->i[c]][0] += k;
+    sum[w->i[c]][1] += d;
+  }
+  if (sim->effects & TAL_EFFECT_SPRING && !(sim->effects & TAL_EFFECT_IMPLICIT))
+    for (size_t i = 0; i < sim->grains.count; i++)
+      sum[i][0] *= sideways(sim, i);
 }
 
-// Smaller of `least` and the limit of one contact; names its grain.
-static void take_least(double candidate, int64_t id, double *least, int64_t *grain) {
-  if (!(candidate < *least))
-    return;
-  *least = candidate;
-  *grain = id;
+typedef struct least_step {
+  double step;
+  int64_t grain;
+} least_step;
+
+// One contact's limit, worked out only where its polynomial says that it is below the least so far.
+static void look(double lambda, double gamma, int64_t id, least_step *least) {
+  const double step = least->step;
+  const bool below = isfinite(step) ? (0.25 * lambda * step + gamma) * step > 1 : lambda > 0 || gamma > 0;
+  if (below)
+    *least = (least_step){limit(lambda, gamma), id};
 }
 
 double tal_critical_step_where(const tal_sim *sim, int64_t *grain) {
   const tal_grains *g = &sim->grains;
+  const tal_contacts *s = &sim->pairs, *w = &sim->wall_contacts;
   double(*sum)[2] = tal_alloc(g->count, sizeof *sum);
-  add_slots(sim, &sim->pairs, true, sum);
-  add_slots(sim, &sim->wall_contacts, false, sum);
-  double least = (double)INFINITY;
-  *grain = -1;
+  least_step least = {(double)INFINITY, -1};
+  add_up(sim, sum);
   if (sim->boundary && sim->boundary->critical)
-    least = sim->boundary->critical(sim, sum);
-  const tal_contacts *s = &sim->pairs;
-  for (size_t c = 0; c < s->count; c++) {
-    if (pair_overlap(sim, c) <= 0)
-      continue;
-    int32_t i = s->i[c], j = s->j[c];
-    take_least(limit(sum[i][0] * g->inverse_mass[i] + sum[j][0] * g->inverse_mass[j],
-                     sum[i][1] * g->inverse_mass[i] + sum[j][1] * g->inverse_mass[j]),
-               g->id[i], &least, grain);
+    least.step = sim->boundary->critical(sim, sum);
+  for (size_t i = 0; i < g->count; i++) {
+    sum[i][0] *= g->inverse_mass[i];
+    sum[i][1] *= g->inverse_mass[i];
   }
-  s = &sim->wall_contacts;
   for (size_t c = 0; c < s->count; c++) {
-    if (s->overlap[c] <= 0)
-      continue;
-    int32_t i = s->i[c];
-    take_least(limit(sum[i][0] * g->inverse_mass[i], sum[i][1] * g->inverse_mass[i]), g->id[i], &least, grain);
+    const double *a = sum[s->i[c]], *b = sum[s->j[c]];
+    if (touches(pair_of(sim, c)))
+      look(a[0] + b[0], a[1] + b[1], g->id[s->i[c]], &least);
   }
+  for (size_t c = 0; c < w->count; c++)
+    if (w->overlap[c] > 0)
+      look(sum[w->i[c]][0], sum[w->i[c]][1], g->id[w->i[c]], &least);
   free(sum);
-  return least;
+  *grain = least.grain;
+  return least.step;
 }
 
 double tal_critical_step(const tal_sim *sim) {
@@ -114,21 +131,23 @@ double tal_quasistatic_coefficient(const tal_sim *sim, double rate, double press
 
 double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
   const tal_grains *g = &sim->grains;
-  const tal_contacts *s = &sim->pairs;
+  const tal_contacts *s = &sim->pairs, *w = &sim->wall_contacts;
   double largest = 0;
   *grain = -1;
   for (size_t c = 0; c < s->count; c++) {
-    double share = pair_overlap(sim, c) / fmin(g->r[s->i[c]], g->r[s->j[c]]);
-    if (share > largest)
+    const pair_gap gap = pair_of(sim, c);
+    const double smaller = fmin(g->r[s->i[c]], g->r[s->j[c]]), within = gap.reach - largest * smaller;
+    if (within > 0 && gap.square < within * within) {
+      largest = (gap.reach - sqrt(gap.square)) / smaller;
       *grain = g->id[s->i[c]];
-    largest = fmax(largest, share);
+    }
   }
-  s = &sim->wall_contacts;
-  for (size_t c = 0; c < s->count; c++) {
-    double share = s->overlap[c] / g->r[s->i[c]];
-    if (share > largest)
-      *grain = g->id[s->i[c]];
-    largest = fmax(largest, share);
+  for (size_t c = 0; c < w->count; c++) {
+    const double share = w->overlap[c] / g->r[w->i[c]];
+    if (share > largest) {
+      largest = share;
+      *grain = g->id[w->i[c]];
+    }
   }
   return largest;
 }

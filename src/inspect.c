@@ -14,6 +14,16 @@ static bool is_finite(const tal_grains *g, size_t i) {
          fabs(g->omega[i]) < huge;
 }
 
+// Of all grains at once, as vectors; who it is, is looked for only where this says that there is one.
+static bool all_well(const tal_sim *sim, double world) {
+  const tal_grains *g = &sim->grains;
+  unsigned ill = 0;
+#pragma omp simd reduction(| : ill)
+  for (size_t i = 0; i < g->count; i++)
+    ill |= !is_finite(g, i) | !(fabs(g->x[i]) <= world) | !(fabs(g->y[i]) <= world);
+  return !ill;
+}
+
 static tal_status inspect_numbers(const tal_sim *sim, tal_error *err) {
   const tal_grains *g = &sim->grains;
   for (size_t i = 0; i < g->count; i++)
@@ -25,10 +35,14 @@ static tal_status inspect_numbers(const tal_sim *sim, tal_error *err) {
   return TAL_OK;
 }
 
-// Beyond the world the digits of a coordinate no longer tell an overlap (D2).
+// [m] Beyond it the digits of a coordinate no longer tell an overlap (D2).
+static double world_of(const tal_sim *sim) {
+  return sim->scene->world_limit * 2 * sim->constants.mean_radius;
+}
+
 static tal_status inspect_world(const tal_sim *sim, tal_error *err) {
   const tal_grains *g = &sim->grains;
-  const double limit = sim->scene->world_limit * 2 * sim->constants.mean_radius;
+  const double limit = world_of(sim);
   for (size_t i = 0; i < g->count; i++)
     if (!(fabs(g->x[i]) <= limit && fabs(g->y[i]) <= limit))
       return tal_fail(err, TAL_INVALID,
@@ -65,8 +79,8 @@ static tal_status inspect_plates(const tal_sim *sim, tal_error *err) {
 }
 
 tal_status tal_inspect(const tal_sim *sim, tal_error *err) {
-  tal_status status = inspect_numbers(sim, err);
-  if (status == TAL_OK)
+  tal_status status = TAL_OK;
+  if (!all_well(sim, world_of(sim)) && (status = inspect_numbers(sim, err)) == TAL_OK)
     status = inspect_world(sim, err);
   if (status == TAL_OK)
     status = inspect_overlap(sim, err);

@@ -16,7 +16,7 @@
 
 #include <string.h>
 
-// Steps between two looks for a run gone bad where nothing moves fast.
+// Evaluations of the forces between two looks for a run gone bad where nothing moves fast.
 enum { INSPECT_EVERY = 100 };
 
 static bool any_spin(const tal_grains *g) {
@@ -258,14 +258,14 @@ static tal_status enter_stage(tal_sim *sim, bool *more, tal_error *err) {
   return TAL_OK;
 }
 
-// Every so many steps, and so often that an overlap half as deep again as the limit cannot come and go in between. It
-// follows from the motion alone: a resumed run looks when the unbroken one does.
-static bool inspection_due(const tal_sim *sim, int64_t before) {
+// Every so many evaluations, and so often that an overlap half as deep again as the limit cannot come and go in
+// between. It follows from the motion alone: a resumed run looks when the unbroken one does.
+static bool inspection_due(const tal_sim *sim) {
   const double travel = 0.25 * sim->scene->overlap_limit * sim->constants.least_radius;
   int64_t every = INSPECT_EVERY;
   if (sim->neighbours.stride * INSPECT_EVERY > travel)
     every = (int64_t)fmax(1, travel / sim->neighbours.stride);
-  return sim->run.step / every != before / every;
+  return sim->run.force_evaluations % every == 0;
 }
 
 tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
@@ -276,7 +276,7 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
   sim->stage->before_step(sim, plan); // pressure and wall velocities of the step (22)-(25)
-  const int64_t length = small_steps(sim, run->stage_step), before = run->step;
+  const int64_t length = small_steps(sim, run->stage_step);
   run->step += length;
   run->stage_step += length;
   run->time = run->stage_start + (double)run->stage_step * plan->integrator.dt;
@@ -286,7 +286,7 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   run->force_evaluations++;
   if ((status = tal_inspect_stride(sim, err)))
     return status;
-  if (inspection_due(sim, before)) {
+  if (inspection_due(sim)) {
     if ((status = tal_inspect(sim, err)))
       return status;
     if ((status = tal_inspect_step(sim, err)))
