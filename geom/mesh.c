@@ -86,7 +86,8 @@ static ranked *canonical_order(const triple *corner, size_t count, size_t points
 
 static void reserve(geo_mesh *mesh, size_t point_count, size_t count) {
   assert(point_count <= INT32_MAX && count <= INT32_MAX);
-  mesh->triangle_capacity = geo_capacity(mesh->triangle_capacity, count);
+  if (count > mesh->triangle_capacity)
+    mesh->triangle_capacity = count + count / 64 + 8; // 2n - 2 less the rim: it hardly grows
   mesh->corner = geo_resize(mesh->corner, mesh->triangle_capacity, sizeof *mesh->corner);
   mesh->neighbour = geo_resize(mesh->neighbour, mesh->triangle_capacity, sizeof *mesh->neighbour);
   mesh->point_count = point_count;
