@@ -177,7 +177,7 @@ TAL_KERNEL double correct_block(const tal_implicit_solve *s, size_t start, int c
   block b;
   const double kick = s->kick, inverse_vR = s->inverse_vR;
   const bool advances = s->advances;
-  double free[BLOCK], given[BLOCK], brake[BLOCK], slip[BLOCK], share[BLOCK] = {0}, part[BLOCK], largest = 0;
+  double free[BLOCK], given[BLOCK], brake[BLOCK] = {0}, slip[BLOCK] = {0}, share[BLOCK] = {0}, part[BLOCK], largest = 0;
   fetch_velocities(&b, m, start, count, false);
 #pragma omp simd
   for (int k = 0; k < count; k++) {

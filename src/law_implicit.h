@@ -7,6 +7,7 @@
 #include "lanes.h"
 #include "root.h"
 #include <math.h>
+#include <string.h>
 
 // Normal force [N] of a contact with elastic force fe and viscosity c [N s/m] whose mean speed of approach over the
 // kick would be `free` without it; yield [m/(s N)]: what a unit of normal force takes off that mean.
@@ -32,57 +33,74 @@ TAL_KERNEL double tal_rough_log2(double x) {
 
 // Regularised law: the root u of u^c + b u = a; u is |ft| / (mu fn), a >= 0 the slip over vR that friction has to
 // brake, b >= 0 the slip over vR that mu fn takes away in the kick, c >= 1. The left side is convex and grows, and the
-// smaller of a/b (it sticks: friction takes all) and a^(1/c) (it slides: friction takes next to nothing) is near it.
-TAL_KERNEL double tal_implicit_guess(double a, double b, double inverse_c) {
+// smaller of a/b (it sticks: friction takes all) and a^(1/c) (it slides: friction takes next to nothing) is near it:
+// above by some 1/c where the two are alike.
+TAL_KERNEL double tal_implicit_guess(double a, double b, double c, double inverse_c) {
   double stuck = a / (b > 1e-280 ? b : 1e-280), slides = tal_rough_exp2(tal_rough_log2(a) * inverse_c);
-  return stuck < slides ? stuck : slides;
+  double least = stuck < slides ? stuck : slides, alike = least / (stuck < slides ? slides : stuck);
+  return least * (1 - (c >= 2 ? 1.2 * inverse_c : 0) * alike * alike);
 }
 
-// One round of Halley's iteration from u with power = u^(c-2).
-TAL_KERNEL double tal_implicit_round(double u, double power, double a, double b, double c) {
-  double first = power * u, excess = u * (first + b) - a, slope = c * first + b, bend = c * (c - 1) * power;
-  return u - 2 * excess * slope / (2 * slope * slope - excess * bend);
-}
+// Contacts whose root is sought together: so many vectors that one operation does not wait for the one before.
+enum { TAL_ROOT_VECTORS = 4, TAL_ROOT_LANES = 8 * TAL_ROOT_VECTORS };
+typedef double tal_wide __attribute__((vector_size(64), may_alias));
+typedef struct tal_roots {
+  tal_wide v[TAL_ROOT_VECTORS];
+} tal_roots;
 
-// out[k] = u[k]^e for a whole e >= 0, by squaring.
-TAL_KERNEL void tal_whole_powers(const double *restrict u, double *restrict out, int count, int e) {
-  double square[TAL_IMPLICIT_BLOCK];
-  for (int k = 0; k < count; k++) {
-    square[k] = u[k];
-    out[k] = e & 1 ? u[k] : 1;
-  }
+// u^e for a whole e >= 0, by squaring.
+TAL_KERNEL void tal_whole_powers(const tal_roots *u, tal_roots *out, int e) {
+  tal_roots square = *u;
+  *out = *u;
+  for (int m = 0; m < TAL_ROOT_VECTORS && !(e & 1); m++)
+    out->v[m] = (tal_wide){0} + 1;
   for (int left = e >> 1; left; left >>= 1) {
-    for (int k = 0; k < count; k++)
-      square[k] *= square[k];
-    if (left & 1)
-      for (int k = 0; k < count; k++)
-        out[k] *= square[k];
+    for (int m = 0; m < TAL_ROOT_VECTORS; m++)
+      square.v[m] *= square.v[m];
+    for (int m = 0; m < TAL_ROOT_VECTORS && left & 1; m++)
+      out->v[m] *= square.v[m];
   }
 }
 
-// Rounds from the guess to round-off for c up to 50, 1e-11 of u for c = 200 (tests/test_implicit_friction.c).
-enum { TAL_IMPLICIT_ROUNDS = 4 };
+TAL_KERNEL void tal_any_powers(const tal_roots *u, tal_roots *out, double e) {
+  const double *from = (const double *)u->v;
+  double *to = (double *)out->v;
+#pragma omp simd
+  for (int k = 0; k < TAL_ROOT_LANES; k++)
+    to[k] = tal_power(from[k], e);
+}
 
-// Roots of `count` contacts, a multiple of the vector's length and at most a block; a and b as above. A whole c takes
-// products where another takes a logarithm and an exponential.
+// One round of Halley's iteration with power = u^(c-2).
+TAL_KERNEL void tal_implicit_round(tal_roots *u, const tal_roots *power, const tal_roots *a, const tal_roots *b,
+                                   double c) {
+  for (int m = 0; m < TAL_ROOT_VECTORS; m++) {
+    const tal_wide first = power->v[m] * u->v[m], excess = u->v[m] * (first + b->v[m]) - a->v[m];
+    const tal_wide slope = c * first + b->v[m], bend = c * (c - 1) * power->v[m];
+    u->v[m] -= 2 * excess * slope / (2 * slope * slope - excess * bend);
+  }
+}
+
+// Roots of `count` contacts, at most a block, in arrays that hold whole sets of TAL_ROOT_LANES; a and b as above. A
+// whole c takes products where another takes a logarithm and an exponential. To round-off for c up to 200
+// (tests/test_implicit_friction.c).
 TAL_KERNEL void tal_implicit_shares(const double *restrict a, const double *restrict b, double *restrict u, int count,
                                     double c) {
-  double power[TAL_IMPLICIT_BLOCK];
   const double inverse_c = 1 / c;
-  const int whole = c >= 2 && c == floor(c) && c < 1000 ? (int)c - 2 : -1;
+  const int whole = c >= 2 && c == floor(c) && c < 1000 ? (int)c - 2 : -1, rounds = c <= 50 ? 3 : 4;
 #pragma omp simd
   for (int k = 0; k < count; k++)
-    u[k] = tal_implicit_guess(a[k] > 1e-280 ? a[k] : 1e-280, b[k], inverse_c);
-  for (int round = 0; round < TAL_IMPLICIT_ROUNDS; round++) {
-    if (whole >= 0)
-      tal_whole_powers(u, power, count, whole);
-    else
-#pragma omp simd
-      for (int k = 0; k < count; k++)
-        power[k] = tal_power(u[k], c - 2);
-#pragma omp simd
-    for (int k = 0; k < count; k++)
-      u[k] = tal_implicit_round(u[k], power[k], a[k], b[k], c);
+    u[k] = tal_implicit_guess(a[k] > 1e-280 ? a[k] : 1e-280, b[k], c, inverse_c);
+  for (int k = 0; k < count; k += TAL_ROOT_LANES) {
+    tal_roots x, power;
+    memcpy(&x, u + k, sizeof x);
+    for (int round = 0; round < rounds; round++) {
+      if (whole >= 0)
+        tal_whole_powers(&x, &power, whole);
+      else
+        tal_any_powers(&x, &power, c - 2);
+      tal_implicit_round(&x, &power, (const tal_roots *)(a + k), (const tal_roots *)(b + k), c);
+    }
+    memcpy(u + k, &x, sizeof x);
   }
 #pragma omp simd
   for (int k = 0; k < count; k++)
