@@ -1,9 +1,8 @@
 // Runs 250 steps of one small scene, for counting their instructions (run.sh): costs NAME. Without a name it prints the
-// names, one a line: a scene each, which differs from another by one effect. The grains are a drop-and-roll packing
-// whose radii are swollen until contacts carry the overlap of 100 kPa, at rest; steps are so short that they stay
-// there.
+// names, one a line: a scene each, which differs from another by one effect. The grains are a confined assembly at
+// rest; steps are so short that they stay there.
+#include "../bench/confined.h"
 #include "effects.h"
-#include "neighbours.h"
 #include "output.h"
 #include "sim.h"
 #include "step.h"
@@ -76,28 +75,9 @@ static void give_up(const char *why) {
 }
 
 static tal_sim *create(const variant *v, tal_scene *scene) {
-  char path[] = "/tmp/talus-costs-XXXXXX";
-  int file = mkstemp(path);
-  FILE *out = fdopen(file, "w");
-  fprintf(out,
-          "grains: {count: %d, radius: {law: uniform, min: 0.5e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
-          "material: {young: 30e9, poisson: 0.3, density: 2675, friction: %g%s}\nmass_scaling: 1e5\n"
-          "contact: {%s}\n%spack: {method: drop_and_roll, width: 32e-3}\nintegrator: {%s}\nstages: [{%s}]\n",
-          GRAINS, v->friction, v->material, v->contact, v->more, v->integrator, v->stage);
-  fclose(out);
-  tal_scene_errors errors;
-  tal_error err;
-  tal_sim *sim = NULL;
-  tal_status status = tal_scene_load(scene, path, NULL, 0, &errors);
-  unlink(path);
-  if (status)
-    give_up(errors.item[0].text);
-  if (tal_sim_create(&sim, scene, &err))
-    give_up(err.text);
-  for (size_t i = 0; i < sim->grains.count; i++)
-    sim->grains.r[i] *= 1.0004;
-  tal_neighbours_rebuild(sim);
-  return sim;
+  return confined_assembly(scene, GRAINS, 32e-3,
+                           ", friction: %g%s}\ncontact: {%s}\n%sintegrator: {%s}\nstages: [{%s}]\n", v->friction,
+                           v->material, v->contact, v->more, v->integrator, v->stage);
 }
 
 // What is counted, found by its name: steps and, where there is an output, what is written then.
