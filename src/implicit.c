@@ -167,6 +167,8 @@ static void answer_walls(const tal_implicit_solve *s) {
 static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
   if (sim->implicit.listed != sim->neighbours.rebuilds)
     tal_implicit_list(sim);
+  const tal_scene_stage *stage = tal_sim_stage(sim);
+  const tal_scene_integrator *plan = stage ? &stage->integrator : &sim->scene->integrator;
   tal_implicit_solve s = {.sim = sim,
                           .system = &sim->implicit,
                           .kick = kick,
@@ -174,10 +176,10 @@ static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
                           .exponent = sim->scene->contact.exponent,
                           .tangential_ratio = sim->constants.tangential_ratio,
                           .effects = sim->effects,
-                          .advances = advances};
-  const tal_scene_stage *stage = tal_sim_stage(sim);
+                          .advances = advances,
+                          .looks = !isnan(plan->tolerance)};
   set_walls(&s);
-  tal_implicit_works done = settle(&s, stage ? &stage->integrator : &sim->scene->integrator);
+  tal_implicit_works done = settle(&s, plan);
   answer_walls(&s);
   sim->forces_kept = false;
   return done;

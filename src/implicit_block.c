@@ -30,7 +30,7 @@ TAL_KERNEL void fetch_places(block *b, const tal_implicit_lanes *m, size_t start
 
 // i's velocity less j's; the spins of both.
 TAL_KERNEL void meet(const tal_lanes *i, const tal_lanes *j, tal_lanes *out) {
-  *out = __builtin_shufflevector(__builtin_shufflevector(*i - *j, *i, 0, 1, 6, 6), *j, 0, 1, 2, 7);
+  *out = __builtin_shufflevector(__builtin_shufflevector(*i - *j, *i, 0, 1, 6, 7), *j, 0, 1, 2, 7);
 }
 
 TAL_KERNEL void fetch_velocities(block *b, const tal_implicit_lanes *m, size_t start, int count, bool before) {
@@ -171,13 +171,25 @@ TAL_KERNEL void begin_block(const tal_implicit_solve *s, size_t start, int count
 
 // ---- sweeps ---------------------------------------------------------------------------------------------------------
 
-// The forces that are right if nothing else changes; the largest change of a friction force over its cap.
+// Of a friction force over its cap.
+TAL_KERNEL double largest_change(const block *b, const tal_implicit_lanes *m, size_t start, int count, double kick) {
+  double largest = 0;
+#pragma omp simd reduction(max : largest)
+  for (int k = 0; k < count; k++) {
+    const double cap = kick * m->friction[start + (size_t)k] * m->fn[start + (size_t)k];
+    const double part = fabs(b->pt[k]) / (cap > 0 ? cap : 1);
+    largest = part > largest ? part : largest;
+  }
+  return largest;
+}
+
+// The forces that are right if nothing else changes; the largest change of a friction force where someone looks.
 TAL_KERNEL double correct_block(const tal_implicit_solve *s, size_t start, int count, unsigned effects) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   const double kick = s->kick, inverse_vR = s->inverse_vR;
   const bool advances = s->advances;
-  double free[BLOCK], given[BLOCK], brake[BLOCK] = {0}, slip[BLOCK] = {0}, share[BLOCK] = {0}, part[BLOCK], largest = 0;
+  double free[BLOCK], given[BLOCK], brake[BLOCK] = {0}, slip[BLOCK] = {0}, share[BLOCK] = {0};
   fetch_velocities(&b, m, start, count, false);
 #pragma omp simd
   for (int k = 0; k < count; k++) {
@@ -204,16 +216,11 @@ TAL_KERNEL double correct_block(const tal_implicit_solve *s, size_t start, int c
           tal_implicit_spring(m->spring[lane], m->spring_stiffness[lane] * kick, free[k], m->slip[lane], given[k], cap);
       force = advances ? moved : within(m->spring[lane], cap);
     }
-    double change = force - m->ft[lane];
-    b.pt[k] = kick * change;
+    b.pt[k] = kick * (force - m->ft[lane]);
     m->ft[lane] = force;
-    part[k] = fabs(change) / (cap > 0 ? cap : 1);
   }
-#pragma omp simd reduction(max : largest)
-  for (int k = 0; k < count; k++)
-    largest = part[k] > largest ? part[k] : largest;
   push(&b, m, start, count);
-  return largest;
+  return s->looks ? largest_change(&b, m, start, count, kick) : 0;
 }
 
 // Takes the share `factor` of all friction off (negative) or adds it, leaving the forces as they are noted.
@@ -229,18 +236,30 @@ TAL_KERNEL double press_block(const tal_implicit_solve *s, size_t start, int cou
 }
 
 // What the next step starts from.
-TAL_KERNEL void keep(const tal_implicit_solve *s, const tal_implicit_lanes *m, size_t start, int count) {
-  const bool springs = s->effects & TAL_EFFECT_SPRING;
+TAL_KERNEL void keep(const tal_implicit_lanes *m, size_t start, int count, bool springs) {
 #pragma omp simd
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
-    bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
     m->kept_viscous[lane] = m->fn[lane] - m->elastic[lane];
-    m->kept_spring[lane] = springs && !slides ? m->spring[lane] : m->ft[lane];
-    m->kept_stiffness[lane] = m->spring_stiffness[lane];
+    m->kept_spring[lane] = m->ft[lane];
+    if (springs) {
+      bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
+      m->kept_spring[lane] = slides ? m->ft[lane] : m->spring[lane];
+      m->kept_stiffness[lane] = m->spring_stiffness[lane];
+    }
   }
 }
 
-tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, int count) {
+// Of whole vectors, each lane for itself before the lanes are added: in an order that depends on no vector's width.
+TAL_KERNEL double add_up(const double *value, int count) {
+  enum { LANES = TAL_IMPLICIT_VECTOR };
+  double lane[LANES] = {0};
+  for (int k = 0; k < count; k += LANES)
+    for (int m = 0; m < LANES; m++)
+      lane[m] += value[k + m];
+  return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
+}
+
+TAL_KERNEL tal_implicit_works work_block(const tal_implicit_solve *s, size_t start, int count, bool springs) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   double friction[BLOCK], damping[BLOCK];
@@ -251,13 +270,12 @@ tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, 
     friction[k] = m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
     damping[k] = (m->elastic[lane] - m->fn[lane]) * (m->approach[lane] + approach_of(&b, m, lane, k));
   }
-  keep(s, m, start, count);
-  tal_implicit_works sum = {0, 0};
-  for (int k = 0; k < count; k++) {
-    sum.friction += friction[k];
-    sum.damping += damping[k];
-  }
-  return (tal_implicit_works){0.5 * s->kick * sum.friction, 0.5 * s->kick * sum.damping};
+  keep(m, start, count, springs);
+  return (tal_implicit_works){0.5 * s->kick * add_up(friction, count), 0.5 * s->kick * add_up(damping, count)};
+}
+
+tal_implicit_works tal_implicit_work(const tal_implicit_solve *s, size_t start, int count) {
+  return s->effects & TAL_EFFECT_SPRING ? work_block(s, start, count, true) : work_block(s, start, count, false);
 }
 
 // A variant for every combination that a pass looks at, from one body: what is absent costs nothing.

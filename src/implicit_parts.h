@@ -12,6 +12,7 @@ typedef struct tal_implicit_solve {
   double kick, inverse_vR, exponent, tangential_ratio;
   unsigned effects;
   bool advances;
+  bool looks; // at changes of friction forces
 } tal_implicit_solve;
 
 // What is done to a tile: velocities before the kick set; forces of the last step put on; corrected; works added up and
@@ -28,7 +29,7 @@ typedef enum tal_implicit_pass {
 void tal_implicit_passes(const tal_implicit_solve *s, const tal_implicit_pass *pass, int count, double factor);
 
 // Lanes [start, start + count), whole vectors, at most TAL_IMPLICIT_BLOCK, of one colour. A correction returns the
-// largest change of a friction force over its cap, the others 0.
+// largest change of a friction force over its cap where the solve looks at it, else 0.
 double tal_implicit_take(const tal_implicit_solve *s, tal_implicit_pass pass, size_t start, int count, double factor);
 // Work over the kick: each force times the mean of the speeds at both ends. Keeps the forces for the next step. Any
 // lanes.

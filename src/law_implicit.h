@@ -41,9 +41,15 @@ TAL_KERNEL double tal_implicit_guess(double a, double b, double c, double invers
   return least * (1 - (c >= 2 ? 1.2 * inverse_c : 0) * alike * alike);
 }
 
-// Contacts whose root is sought together: so many vectors that one operation does not wait for the one before.
-enum { TAL_ROOT_VECTORS = 4, TAL_ROOT_LANES = 8 * TAL_ROOT_VECTORS };
-typedef double tal_wide __attribute__((vector_size(64), may_alias));
+// Contacts whose root is sought together: so many vectors that one operation does not wait for the one before, of the
+// width that the processor has, for wider ones go through memory.
+#ifdef __AVX512F__
+enum { TAL_WIDTH_OF_ROOTS = 8 };
+#else
+enum { TAL_WIDTH_OF_ROOTS = 4 };
+#endif
+enum { TAL_ROOT_VECTORS = 4, TAL_ROOT_LANES = TAL_WIDTH_OF_ROOTS * TAL_ROOT_VECTORS };
+typedef double tal_wide __attribute__((vector_size(8 * TAL_WIDTH_OF_ROOTS), aligned(8), may_alias));
 typedef struct tal_roots {
   tal_wide v[TAL_ROOT_VECTORS];
 } tal_roots;
