@@ -62,8 +62,8 @@ static void fill_wall(tal_sim *sim, tal_contacts *slots, size_t c, int32_t i, in
   slots->spring[c] = slots->spring_stiffness[c] = slots->viscous[c] = 0;
 }
 
-// Both lists ascend by (i, j): one merge carries the histories over.
-static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
+// Both lists ascend by (i, j): one merge carries the histories over. What the implicit scheme left is for itself alone.
+static void carry_springs(const tal_contacts *old, tal_contacts *slots, bool solved) {
   size_t o = 0;
   if (!old->spring)
     return;
@@ -73,7 +73,7 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots) {
     if (o < old->count && old->i[o] == slots->i[c] && old->j[o] == slots->j[c]) {
       slots->spring[c] = old->spring[o];
       slots->spring_stiffness[c] = old->spring_stiffness[o];
-      if (slots->viscous && old->viscous)
+      if (solved && old->viscous)
         slots->viscous[c] = old->viscous[o];
     }
   }
@@ -110,7 +110,7 @@ static void list_pairs(tal_sim *sim) {
   for (size_t c = 0; c < pairs->count; c++)
     fill_pair(sim, &fresh, c, pairs->pair[c][0], pairs->pair[c][1]);
   if (needs.past)
-    carry_springs(&sim->pairs, &fresh);
+    carry_springs(&sim->pairs, &fresh, needs.solved);
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
   geo_pairs_clear(pairs);
@@ -162,7 +162,7 @@ static void list_walls(tal_sim *sim) {
   }
   sim->neighbours.wall_first[g->count] = (int32_t)fresh.count;
   if (sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT))
-    carry_springs(&sim->wall_contacts, &fresh);
+    carry_springs(&sim->wall_contacts, &fresh, sim->effects & TAL_EFFECT_IMPLICIT);
   if (sim->neighbours.rebuilds > 0) { // what is there at the start is part of the start
     book_change(sim, &sim->wall_contacts, false);
     book_change(sim, &fresh, true);
@@ -236,7 +236,8 @@ void tal_neighbours_rebuild(tal_sim *sim) {
 }
 
 void tal_neighbours_restore(tal_sim *sim) {
-  sim->neighbours.rebuilds = 0; // the first list of this process: no wall comes or goes by it
+  sim->neighbours.rebuilds = 0;       // the first list of this process: no wall comes or goes by it
+  tal_implicit_clear(&sim->implicit); // lanes of a list before this one
   list_all(sim);
   sim->neighbours.moved = sim->constants.skin; // the next step has to look
 }

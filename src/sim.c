@@ -310,6 +310,7 @@ void tal_sim_row(tal_sim *sim, tal_row *row) {
   row->membrane_tension = sim->membrane.count ? 0 : (double)NAN;
   for (size_t b = 0; b < sim->membrane.count; b++)
     row->membrane_tension = fmax(row->membrane_tension, sim->membrane.tension[b]);
+  tal_implicit_save(sim); // springs hold energy
   tal_energy_row(sim, row);
   row->dt_ratio = tal_step_longest(sim) / tal_critical_step(sim);
   double rate = plan && fabs(plan->rate) > 0 ? fabs(plan->rate) : first_rate(sim->scene);

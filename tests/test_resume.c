@@ -158,6 +158,26 @@ static void interrupted_and_resumed(void **state) {
   }
 }
 
+// EXACT: confined by one scheme and compressed by another, interrupted in each.
+static void schemes_in_turn(void **state) {
+  (void)state;
+  static const char *const schemes[][2] = {{"implicit_friction", "verlet"}, {"verlet", "implicit_friction"}};
+  for (int k = 0; k < 2; k++) {
+    char text[2000], *at;
+    snprintf(text, sizeof text, biaxial, 100, k ? "regularised" : "spring", 13e-3, 0.04, 0.004);
+    for (int stage = 0; stage < 2; stage++) {
+      char rest[2000];
+      at = strstr(text, stage ? "strain: 0.004" : "dt: 1.25e-5");
+      assert_non_null(at);
+      snprintf(rest, sizeof rest, "%s", at + strlen(stage ? "strain: 0.004" : "dt: 1.25e-5"));
+      snprintf(at, sizeof text - (size_t)(at - text),
+               stage ? "strain: 0.004, integrator: {scheme: %s}%s" : "dt: 1.25e-5, scheme: %s%s", schemes[k][stage],
+               rest);
+    }
+    compare_interrupted(text, (const double[]){0.3, 0.6, 0.8}, 3);
+  }
+}
+
 // EXACT: so many grains that the loops are shared out among the threads.
 static void other_number_of_threads(void **state) {
   (void)state;
@@ -308,9 +328,8 @@ int main(int argc, char **argv) {
     cmocka_set_test_filter(argv[1]);
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {
-      cmocka_unit_test(interrupted_and_resumed),
-      cmocka_unit_test(other_number_of_threads),
-      cmocka_unit_test(killed_and_resumed),
+      cmocka_unit_test(interrupted_and_resumed), cmocka_unit_test(schemes_in_turn),
+      cmocka_unit_test(other_number_of_threads), cmocka_unit_test(killed_and_resumed),
       cmocka_unit_test(restored_at_any_step),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);

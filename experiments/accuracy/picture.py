@@ -31,6 +31,12 @@ def dials(rows):
     return list(rows[0])[1:list(rows[0]).index("metric")]
 
 
+def title(path, rows):
+    study = path.rsplit("/", 1)[-1].split(".")[0]
+    names = ", ".join(dials(rows))
+    return names if study in names else f"{study}: {names}"
+
+
 def text(x, y, what, size=11, anchor="middle", colour="#222"):
     what = str(what).replace("&", "&amp;").replace("<", "&lt;")
     return f'<text x="{x:.0f}" y="{y:.0f}" font-size="{size}" text-anchor="{anchor}" fill="{colour}">{what}</text>'
@@ -59,7 +65,7 @@ def panel(path, x0, y0):
         value = max(-reach, min(reach, value))
         return (y0 + TOP + bottom) / 2 - value / reach * (bottom - y0 - TOP) / 2 * 0.96
 
-    out = [text(x0 + LEFT, y0 + 20, ", ".join(dials(rows)), 14, "start"),
+    out = [text(x0 + LEFT, y0 + 20, title(path, rows), 14, "start"),
            text(right, y0 + 20, "reference " + reference["setting"], 11, "end", "#666"),
            f'<rect x="{x0 + LEFT}" y="{y0 + TOP}" width="{right - x0 - LEFT}" height="{bottom - y0 - TOP}" '
            'fill="none" stroke="#bbb"/>']

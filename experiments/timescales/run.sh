@@ -27,9 +27,12 @@ part() {
   times) "$talus" study "$here/times.yaml" -o "$out/times" -t 1 ;;
   ours) for s in 1 2 3 4 5 6 7 8; do run "ours-$s" --set "seed=$s"; done ;;
   I) for s in 1 2 3 4 5 6 7 8; do run "I-$s" --set "seed=$s" --set "$I"; done ;;
-  II) for s in 1 2; do run "II-$s" --set "seed=$s" --set "$II"; done ;;
+  II)
+    run II-1 --set seed=1 --set "$II"
+    run II-2 --set seed=2 --set stages.1.strain=0.02 --set "$II"
+    ;;
   III) run III-1 --set seed=1 --set "$III" ;;
-  big) for s in 1 2 3 4; do
+  big) for s in 1 2; do
     run "big-ours-$s" --set "seed=$s" --set grains.count=3970 --set pack.width=64e-3
     run "big-I-$s" --set "seed=$s" --set grains.count=3970 --set pack.width=64e-3 --set "$I"
   done ;;
