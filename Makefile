@@ -133,8 +133,9 @@ short: all
 	@for t in experiments/test_*.py experiments/*/test_*.py; do TALUS=$(abspath $(OUT)/talus) $(PYTHON) $$t || exit 1; done
 	@for e in experiments/*/run.sh; do echo "$$e --short"; \
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
-bench: $(BENCHES)
-	@for b in $^; do $$b || exit 1; done
+bench: $(BENCHES) $(OUT)/talus
+	@for b in $(BENCHES); do $$b || exit 1; done
+	@sh tests/bench/estimate.sh $(OUT)/talus
 # The same assembly in LAMMPS, where it is installed (package lammps).
 bench-peers: $(OUT)/tests/bench/bench_step
 	@sh tests/bench/peers.sh $<
