@@ -28,7 +28,7 @@ part() {
   ours) for s in 1 2 3 4 5 6 7 8; do run "ours-$s" --set "seed=$s"; done ;;
   I) for s in 1 2 3 4 5 6 7 8; do run "I-$s" --set "seed=$s" --set "$I"; done ;;
   II)
-    run II-1 --set seed=1 --set "$II"
+    run II-1 --set seed=1 --set stages.1.strain=0.05 --set "$II"
     run II-2 --set seed=2 --set stages.1.strain=0.02 --set "$II"
     ;;
   III) run III-1 --set seed=1 --set "$III" ;;
