@@ -36,8 +36,10 @@ static drive to_and_fro(double amplitude, int cycles, int quarter, const char *s
       e->sim->walls.wall[0].vx = way[part];
       engine_steps(e, quarter);
     }
-    if (cycle == 0)
+    if (cycle == 0) {
+      engine_row(e); // brings histories up to date
       first = e->sim->wall_contacts.spring[0];
+    }
   }
   const tal_row row = engine_row(e);
   const drive result = {row.dissipated_friction, fabs(e->sim->wall_contacts.spring[0] - first), row.energy_residual};
@@ -62,7 +64,8 @@ static void test_contact_cycles(void **state) {
     lost = fmax(lost, fabs(small.lost) / (0.5 * cap * slip));
     assert_true(fabs(small.residual) < 1e-12 && fabs(large.residual) < 1e-12);
   }
-  assert_true(loop < 1e-12 && drift == 0 && lost < 2e-3); // the last step of implicit friction is half booked
+  if (!(loop < 1e-12 && drift == 0 && lost < 2e-3)) // the last step of implicit friction is half booked
+    fail_msg("loop %g, drift %g, lost %g", loop, drift, lost);
   hard_report(
       &(hard_row){"shear reversal, one contact", hard_text("%d cycles, amplitude 0.5 and 4 of mu fn / kt", cycles),
                   "hysteresis loop in closed form; each cycle ends where the last did",
