@@ -193,8 +193,8 @@ static bool same_cost(const tal_scene_integrator *a, const tal_scene_integrator 
   return strcmp(a->scheme, b->scheme) == 0 && a->m == b->m && a->n == b->n && a->q == b->q && a->sweeps == b->sweeps;
 }
 
-// The same for another integrator than the first stage's, tried there.
-static double rate_with(const tal_scene *scene, const tal_scene_integrator *integrator) {
+// The same for another integrator than the first stage's, tried there; the first's where that cannot be.
+static double rate_with(const tal_scene *scene, const tal_scene_integrator *integrator, double first) {
   tal_scene_stage stage = scene->stages[0];
   tal_scene tried = *scene;
   stage.integrator = *integrator;
@@ -202,10 +202,10 @@ static double rate_with(const tal_scene *scene, const tal_scene_integrator *inte
   tried.stage_count = 1;
   tal_sim *sim;
   if (tal_sim_create(&sim, &tried, NULL))
-    return (double)NAN;
+    return first;
   const double rate = measured_rate(sim);
   tal_sim_free(sim);
-  return rate;
+  return rate > 0 ? rate : first;
 }
 
 static void print_cost(tal_sim *sim, tal_scene *scene) {
@@ -220,7 +220,7 @@ static void print_cost(tal_sim *sim, tal_scene *scene) {
     }
     const bool as_first = same_cost(&stage->integrator, &scene->stages[0].integrator);
     if (planned > 0)
-      seconds += planned / (as_first ? first : rate_with(scene, &stage->integrator));
+      seconds += planned / (as_first ? first : rate_with(scene, &stage->integrator, first));
     steps += planned;
   }
   if (steps == 0)

@@ -34,8 +34,8 @@ draw() { # file, column, label, factor, group prefix of the runs' names
       plot="$plot, '$work/$kind-$count' using 1:(\$2*$4) with lines lc rgb '$color' lw 0.4 dt $dash notitle"
     done
     [ $count -gt 0 ] || continue
-    # bins that every run reaches
-    awk -v runs=$count '{ b = int($1 / 0.1); s[b] += $2; n[b]++ } END { for (b in s) print 0.1 * (b + 0.5), s[b] / n[b] }' \
+    # where fewer runs reach, the mean is theirs
+    awk '{ b = int($1 / 0.1); s[b] += $2; n[b]++ } END { for (b in s) print 0.1 * (b + 0.5), s[b] / n[b] }' \
       "$work/$kind" | sort -g > "$work/$kind-mean"
     plot="$plot, '$work/$kind-mean' using 1:(\$2*$4) with lines lc rgb '$color' lw 2.5 dt $dash title '$kind ($(reach "$work/$kind"-?))'"
   done
