@@ -134,6 +134,7 @@ short: all
 	@for e in experiments/*/run.sh; do echo "$$e --short"; \
 	  TALUS=$(abspath $(OUT)/talus) OUT=$(abspath $(OUT)/short) sh $$e --short || exit 1; done
 bench: $(BENCHES) $(OUT)/talus
+	@sh tests/bench/machine.sh
 	@for b in $(BENCHES); do $$b || exit 1; done
 	@sh tests/bench/estimate.sh $(OUT)/talus
 # The same assembly in LAMMPS, where it is installed (package lammps).

@@ -1,7 +1,9 @@
 // Grain-steps per second on one core in a confined assembly under compression, the share of each phase of a step, and
 // what a second thread brings. CPU time of the one thread, median of REPEATS, with all that comes now and then; beside
 // it the 10th percentile of single steps, which other programs disturb less. Usage: bench_step [-v NAME] [N ...]: the
-// variants whose name begins so (all), the sizes (4000 100000). bench_step -w FILE N: writes the assembly for LAMMPS.
+// variants whose name begins so (all), the sizes (4000 100000 1000000). bench_step -w FILE N: writes the assembly for
+// LAMMPS.
+#include "boundary.h"
 #include "confined.h"
 #include "effects.h"
 #include "forces.h"
@@ -79,7 +81,7 @@ static void drift(tal_sim *sim) {
   tal_integrate_drift(sim, 0);
 }
 static void forces(tal_sim *sim) {
-  tal_forces_step(sim, 0, 0);
+  tal_forces_step(sim, 0, 0, !(sim->boundary && !sim->boundary->centres));
 }
 static void rebuild(tal_sim *sim) {
   tal_neighbours_rebuild(sim);
@@ -107,10 +109,11 @@ static size_t touching(tal_sim *sim) {
   return count;
 }
 
-// Shares of the phases of a step. A solve cannot be made apart: it is what the implicit scheme's rest is.
+// Shares of the phases of a step. A sweep drifts its grains itself where it may; a solve cannot be made apart: it is
+// what the implicit scheme's rest is.
 static void print_phases(tal_sim *sim, double step, double rebuilds, int count) {
   const bool solves = sim->effects & TAL_EFFECT_IMPLICIT;
-  double t_drift = phase(drift, sim, count), t_forces = solves ? 0 : phase(forces, sim, count),
+  double t_drift = solves ? phase(drift, sim, count) : 0, t_forces = solves ? 0 : phase(forces, sim, count),
          t_list = phase(rebuild, sim, count / 10 + 1) * rebuilds, t_graph = phase(refresh, sim, count / 10 + 1) / 250;
   double rest = step - t_drift - t_forces - t_list - t_graph;
   printf("   %5.1f %6.1f %5.1f %5.1f %5.1f", 100 * t_drift / step, 100 * t_forces / step, 100 * t_list / step,
@@ -122,17 +125,20 @@ typedef struct timing {
 } timing;
 
 static timing time_steps(tal_sim *sim, int count) {
-  const int all = REPEATS * count;
-  double *single = tal_alloc((size_t)all, sizeof *single), mean[REPEATS] = {0};
-  for (int k = 0; k < all; k++) {
+  double *single = tal_alloc((size_t)count, sizeof *single), mean[REPEATS];
+  for (int r = 0; r < REPEATS; r++) {
+    const double start = cpu_seconds();
+    steps(sim, count);
+    mean[r] = (cpu_seconds() - start) / count;
+  }
+  for (int k = 0; k < count; k++) {
     const double start = cpu_seconds();
     steps(sim, 1);
     single[k] = cpu_seconds() - start;
-    mean[k / count] += single[k] / count;
   }
-  qsort(single, (size_t)all, sizeof *single, ascending);
+  qsort(single, (size_t)count, sizeof *single, ascending);
   qsort(mean, REPEATS, sizeof *mean, ascending);
-  const timing t = {mean[REPEATS / 2], single[all / 10]};
+  const timing t = {mean[REPEATS / 2], single[count / 10]};
   free(single);
   return t;
 }
@@ -168,7 +174,7 @@ static void measure(const variant *v, int n) {
   uint64_t rebuilds = sim->neighbours.rebuilds;
   const timing t = time_steps(sim, count);
   const double ns = 1e9 * t.mean / grains;
-  double listed = (double)(sim->neighbours.rebuilds - rebuilds) / (REPEATS * count);
+  double listed = (double)(sim->neighbours.rebuilds - rebuilds) / ((REPEATS + 1) * count);
   printf("%-38s %8d %7.1f %7.1f %7.1f %7.1f %6.2f %6.2f %6.0f %7.2f", v->name, n, 1e3 / ns, ns, 1e9 * t.best / grains,
          1e9 * t.mean / (double)touching(sim), ns / limit, (double)sim->pairs.count / grains, bytes / grains,
          second_thread(sim, count / 4 + 1));
@@ -221,11 +227,12 @@ int main(int argc, char **argv) {
   omp_set_num_threads(1);
   printf("%-38s %8s %7s %7s %7s %7s %6s %6s %6s %7s   share of a step [%%]\n", "variant", "N", "M gs/s", "ns per",
          "best", "ns per", "over", "slots", "bytes", "second");
-  printf("%-38s %8s %7s %7s %7s %7s %6s %6s %6s %7s   drift forces  list graph  rest\n", "", "", "", "grain", "steps",
+  printf("%-38s %8s %7s %7s %7s %7s %6s %6s %6s %7s   drift  sweep  list graph  rest\n", "", "", "", "grain", "steps",
          "contact", "limit", "/grain", "/grain", "thread");
   if (first == argc) {
     measure_all(wanted, 4000);
     measure_all(wanted, 100000);
+    measure_all(wanted, 1000000);
   }
   for (int k = first; k < argc; k++)
     measure_all(wanted, atoi(argv[k]));
