@@ -186,8 +186,10 @@ static tal_implicit_works solve_all(tal_sim *sim, double kick, bool advances) {
 }
 
 void tal_implicit_observe(tal_sim *sim) {
+  tal_implicit_save(sim);
   solve_all(sim, 0.5 * sim->dt, false);
   tal_implicit_answer(sim);
+  sim->implicit.listed = UINT64_MAX;
 }
 
 // The bodies hold where the kick ends; the instant is in its middle.

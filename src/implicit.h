@@ -23,7 +23,6 @@ struct tal_sim;
   X(friction, "1", "slot's")                                                                                           \
   X(radius_i, "m", "of grain i")                                                                                       \
   X(reach, "m", "sum of the radii")                                                                                    \
-  X(share_i, "1", "of the overlap that shortens i's arm: half of it, all of it at a wall")                             \
   X(mass_i, "1/kg", "inverse")                                                                                         \
   X(mass_j, "1/kg", "inverse")                                                                                         \
   X(inertia_i, "1/(kg m^2)", "inverse")                                                                                \
@@ -37,13 +36,12 @@ struct tal_sim;
   X(viscosity, "N s/m", "normal force per speed of approach, this step")                                               \
   X(approach, "m/s", "at the start of the kick")                                                                       \
   X(slip, "m/s", "at the start of the kick")                                                                           \
-  X(fn, "N", "normal force found so far")                                                                              \
+  X(fn, "N", "normal force found so far; between steps elastic and the slot's `viscous`")                              \
   X(ft, "N", "tangential force found so far, on i along t = (-ny, nx)")                                                \
   X(spring, "N", "spring law: force of the spring at this instant")                                                    \
   X(spring_stiffness, "N/m", "spring law: at this instant")                                                            \
-  X(kept_spring, "N", "slot's `spring`, after the last step")                                                          \
-  X(kept_stiffness, "N/m", "slot's `spring_stiffness`, after the last step")                                           \
-  X(kept_viscous, "N", "slot's `viscous`, after the last step")
+  X(kept_spring, "N", "spring law: slot's `spring`, after the last step")                                              \
+  X(kept_stiffness, "N/m", "spring law: slot's `spring_stiffness`, after the last step")
 
 // A grain, or what a wall slot meets: place and velocities (v, v, spin, spin), at the end of the kick with the forces
 // found so far and at its start.
@@ -100,7 +98,8 @@ void tal_implicit_clear(tal_implicit *system);
 // boundary forces; the second half of the kick; works over `credit` seconds [eq (16)]; histories move. The wall slots
 // hold their forces then, the force records where tal_implicit_answer is asked.
 void tal_implicit_step(struct tal_sim *sim, double credit);
-// An observation: forces for half a step from the velocities as they stand, into force records and wall slots.
+// An observation: forces for half a step from the velocities as they stand, into force records and wall slots. Lanes
+// are made anew after it.
 void tal_implicit_observe(struct tal_sim *sim);
 // Fills the force records from the last step.
 void tal_implicit_answer(struct tal_sim *sim);

@@ -95,44 +95,39 @@ TAL_KERNEL double approach_of(const block *b, const tal_implicit_lanes *m, size_
 
 // ---- the start of a solve -------------------------------------------------------------------------------------------
 
-// Geometry, elastic force and viscosity of a block, and the approach and slip it starts the kick with.
+TAL_KERNEL double within(double value, double cap) {
+  double above = value > cap ? cap : value;
+  return above < -cap ? -cap : above;
+}
+
+// Geometry, elastic force and viscosity of a block, the approach and slip it starts the kick with, and the forces that
+// the last step left, within today's bounds.
 TAL_KERNEL void see(const tal_implicit_solve *s, block *b, size_t start, int count, unsigned effects) {
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
+  const double *restrict left = effects & TAL_EFFECT_SPRING ? m->kept_spring : m->ft;
   fetch_places(b, m, start, count);
   fetch_velocities(b, m, start, count, true);
 #pragma omp simd
   for (int k = 0; k < count; k++) {
     const size_t lane = start + (size_t)k;
     double distance = sqrt(b->dx[k] * b->dx[k] + b->dy[k] * b->dy[k]), inverse = 1 / distance;
-    double overlap = m->reach[lane] - distance;
+    double overlap = m->reach[lane] - distance, viscous = m->fn[lane] - m->elastic[lane];
     m->nx[lane] = b->dx[k] * inverse;
     m->ny[lane] = b->dy[k] * inverse;
     m->overlap[lane] = overlap;
-    m->arm_i[lane] = m->radius_i[lane] - m->share_i[lane] * overlap;
+    double share = m->reach[lane] > m->radius_i[lane] ? 0.5 : 1; // of the overlap shortens i's arm: all of it at a wall
+    m->arm_i[lane] = m->radius_i[lane] - share * overlap;
     m->arm_j[lane] = m->reach[lane] - m->radius_i[lane] - 0.5 * overlap;
     tal_meeting meeting = {.overlap = overlap, .stiffness = m->stiffness[lane], .damping = m->damping[lane]};
-    m->elastic[lane] = tal_contact_law(meeting, (tal_law_constants){0}, effects & TAL_EFFECT_HERTZ).fe;
+    double elastic = tal_contact_law(meeting, (tal_law_constants){0}, effects & TAL_EFFECT_HERTZ).fe;
+    double fn = elastic + (effects & TAL_EFFECT_DAMPING ? viscous : 0);
+    fn = fn > 0 && overlap > 0 ? fn : 0;
+    m->elastic[lane] = elastic;
     m->viscosity[lane] = effects & TAL_EFFECT_DAMPING ? tal_viscosity(meeting, effects) : 0;
     m->approach[lane] = approach_of(b, m, lane, k);
     m->slip[lane] = slip_of(b, m, lane, k);
-  }
-}
-
-TAL_KERNEL double within(double value, double cap) {
-  double above = value > cap ? cap : value;
-  return above < -cap ? -cap : above;
-}
-
-// The forces of the last step, within today's bounds.
-TAL_KERNEL void remember(const tal_implicit_solve *s, size_t start, int count, unsigned effects) {
-  const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
-#pragma omp simd
-  for (int k = 0; k < count; k++) {
-    const size_t lane = start + (size_t)k;
-    double fn = m->elastic[lane] + (effects & TAL_EFFECT_DAMPING ? m->kept_viscous[lane] : 0);
-    fn = fn > 0 ? fn : 0;
-    m->fn[lane] = m->overlap[lane] > 0 ? fn : 0;
-    m->ft[lane] = within(m->kept_spring[lane], m->friction[lane] * m->fn[lane]);
+    m->fn[lane] = fn;
+    m->ft[lane] = within(left[lane], m->friction[lane] * fn);
   }
 }
 
@@ -158,7 +153,6 @@ TAL_KERNEL void begin_block(const tal_implicit_solve *s, size_t start, int count
   const tal_implicit_lanes lanes = s->system->lane, *m = &lanes;
   block b;
   see(s, &b, start, count, effects);
-  remember(s, start, count, effects);
   if (effects & TAL_EFFECT_SPRING)
     move_springs(s, start, count, effects);
 #pragma omp simd
@@ -196,7 +190,7 @@ TAL_KERNEL double correct_block(const tal_implicit_solve *s, size_t start, int c
     const size_t lane = start + (size_t)k;
     double yield = 0.5 * kick * (m->mass_i[lane] + m->mass_j[lane]);
     double mean = 0.5 * (m->approach[lane] + approach_of(&b, m, lane, k)) + yield * m->fn[lane];
-    double fn = m->overlap[lane] > 0 ? tal_implicit_normal(m->elastic[lane], m->viscosity[lane], mean, yield) : 0;
+    double fn = m->elastic[lane] > 0 ? tal_implicit_normal(m->elastic[lane], m->viscosity[lane], mean, yield) : 0;
     given[k] = kick * (m->mass_i[lane] + m->mass_j[lane] + m->arm_i[lane] * m->arm_i[lane] * m->inertia_i[lane] +
                        m->arm_j[lane] * m->arm_j[lane] * m->inertia_j[lane]);
     free[k] = slip_of(&b, m, lane, k) - given[k] * m->ft[lane];
@@ -235,17 +229,13 @@ TAL_KERNEL double press_block(const tal_implicit_solve *s, size_t start, int cou
   return 0;
 }
 
-// What the next step starts from.
-TAL_KERNEL void keep(const tal_implicit_lanes *m, size_t start, int count, bool springs) {
+// The springs that the next step starts from; of all else it finds fn and ft.
+TAL_KERNEL void keep_springs(const tal_implicit_lanes *m, size_t start, int count) {
 #pragma omp simd
   for (size_t lane = start; lane < start + (size_t)count; lane++) {
-    m->kept_viscous[lane] = m->fn[lane] - m->elastic[lane];
-    m->kept_spring[lane] = m->ft[lane];
-    if (springs) {
-      bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
-      m->kept_spring[lane] = slides ? m->ft[lane] : m->spring[lane];
-      m->kept_stiffness[lane] = m->spring_stiffness[lane];
-    }
+    bool slides = fabs(m->ft[lane]) >= m->friction[lane] * m->fn[lane];
+    m->kept_spring[lane] = slides ? m->ft[lane] : m->spring[lane];
+    m->kept_stiffness[lane] = m->spring_stiffness[lane];
   }
 }
 
@@ -270,7 +260,8 @@ TAL_KERNEL tal_implicit_works work_block(const tal_implicit_solve *s, size_t sta
     friction[k] = m->ft[lane] * (m->slip[lane] + slip_of(&b, m, lane, k));
     damping[k] = (m->elastic[lane] - m->fn[lane]) * (m->approach[lane] + approach_of(&b, m, lane, k));
   }
-  keep(m, start, count, springs);
+  if (springs)
+    keep_springs(m, start, count);
   return (tal_implicit_works){0.5 * s->kick * add_up(friction, count), 0.5 * s->kick * add_up(damping, count)};
 }
 

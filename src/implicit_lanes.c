@@ -154,14 +154,15 @@ static void fill_lane(const tal_sim *sim, const tal_implicit_lanes *s, size_t la
   s->friction[lane] = wall ? slots->friction[c] : sim->friction;
   s->radius_i[lane] = g->r[i];
   s->reach[lane] = g->r[i] + (wall ? 0 : g->r[j]);
-  s->share_i[lane] = wall ? 1 : 0.5;
   s->mass_i[lane] = g->inverse_mass[i];
   s->mass_j[lane] = wall ? 0 : g->inverse_mass[j];
   s->inertia_i[lane] = spin ? g->inverse_inertia[i] : 0;
   s->inertia_j[lane] = spin && !wall ? g->inverse_inertia[j] : 0;
   s->kept_spring[lane] = slots->spring[c];
   s->kept_stiffness[lane] = slots->spring_stiffness[c];
-  s->kept_viscous[lane] = slots->viscous[c];
+  s->elastic[lane] = 0;
+  s->fn[lane] = slots->viscous[c];
+  s->ft[lane] = slots->spring[c];
 }
 
 // A lane between two bodies that nobody moves, without radius.
@@ -252,6 +253,7 @@ void tal_implicit_take_friction(tal_sim *sim) {
 void tal_implicit_save(tal_sim *sim) {
   const tal_implicit *s = &sim->implicit;
   const tal_implicit_lanes *m = &s->lane;
+  const double *spring = sim->effects & TAL_EFFECT_SPRING ? m->kept_spring : m->ft;
   if (s->listed != sim->neighbours.rebuilds)
     return;
   for (size_t lane = 0; lane < s->lanes; lane++) {
@@ -260,8 +262,8 @@ void tal_implicit_save(tal_sim *sim) {
     const bool wall = m->slot[lane] < 0;
     tal_contacts *slots = wall ? &sim->wall_contacts : &sim->pairs;
     const size_t c = (size_t)(wall ? ~m->slot[lane] : m->slot[lane]);
-    slots->spring[c] = m->kept_spring[lane];
+    slots->spring[c] = spring[lane];
     slots->spring_stiffness[c] = m->kept_stiffness[lane];
-    slots->viscous[c] = m->kept_viscous[lane];
+    slots->viscous[c] = m->fn[lane] - m->elastic[lane];
   }
 }

@@ -25,22 +25,55 @@ typedef struct work_list {
 } work_list;
 
 // Velocities before the kick, and after it with the boundary's forces and gravity alone.
-static void set_grains(const tal_implicit_solve *s, size_t from, size_t to) {
+static void set_one(const tal_implicit_solve *s, size_t i, bool spin, bool boundary) {
   const tal_grains *g = &s->sim->grains;
-  const double *gravity = s->sim->scene->gravity;
-  const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
-  tal_implicit_body *body = s->system->lane.body;
-  for (size_t i = from; i < to; i++) {
-    const double kick = g->inverse_mass[i] > 0 ? s->kick : 0;
-    double ax = gravity[0], ay = gravity[1], w = spin ? g->omega[i] : 0;
-    if (boundary) {
-      ax += g->bx[i] * g->inverse_mass[i];
-      ay += g->by[i] * g->inverse_mass[i];
-    }
-    body[i].place = (tal_lanes){g->x[i], g->y[i], 0, 0};
-    body[i].before = (tal_lanes){g->vx[i], g->vy[i], w, w};
-    body[i].now = body[i].before + (tal_lanes){kick * ax, kick * ay, 0, 0};
+  const double kick = g->inverse_mass[i] > 0 ? s->kick : 0, w = spin ? g->omega[i] : 0;
+  double ax = s->sim->scene->gravity[0], ay = s->sim->scene->gravity[1];
+  if (boundary) {
+    ax += g->bx[i] * g->inverse_mass[i];
+    ay += g->by[i] * g->inverse_mass[i];
   }
+  tal_implicit_body *body = &s->system->lane.body[i];
+  body->place = (tal_lanes){g->x[i], g->y[i], 0, 0};
+  body->before = (tal_lanes){g->vx[i], g->vy[i], w, w};
+  body->now = (tal_lanes){g->vx[i] + kick * ax, g->vy[i] + kick * ay, w, w};
+}
+
+static tal_lanes four(const double *from) {
+  return *(const tal_lanes *)from;
+}
+
+// The same of grains i ... i + 3, i a multiple of 4.
+static void set_four(const tal_implicit_solve *s, size_t i, bool spin, bool boundary) {
+  const tal_grains *g = &s->sim->grains;
+  const tal_lanes nil = {0}, inverse_mass = four(g->inverse_mass + i), w = spin ? four(g->omega + i) : nil;
+  tal_lanes kick = nil + s->kick;
+  for (int q = 0; q < 4; q++)
+    kick[q] = inverse_mass[q] > 0 ? kick[q] : 0;
+  tal_lanes ax = nil + s->sim->scene->gravity[0], ay = nil + s->sim->scene->gravity[1];
+  if (boundary) {
+    ax += four(g->bx + i) * inverse_mass;
+    ay += four(g->by + i) * inverse_mass;
+  }
+  const tal_lanes vx = four(g->vx + i), vy = four(g->vy + i);
+  tal_lanes place[4] = {four(g->x + i), four(g->y + i), nil, nil}, before[4] = {vx, vy, w, w};
+  tal_lanes now[4] = {vx + kick * ax, vy + kick * ay, w, w};
+  tal_lanes_turn(place);
+  tal_lanes_turn(before);
+  tal_lanes_turn(now);
+  for (size_t q = 0; q < 4; q++)
+    s->system->lane.body[i + q] = (tal_implicit_body){.place = place[q], .now = now[q], .before = before[q]};
+}
+
+static void set_grains(const tal_implicit_solve *s, size_t from, size_t to) {
+  const bool spin = s->effects & TAL_EFFECT_SPIN, boundary = s->effects & TAL_EFFECT_BOUNDARY;
+  size_t i = from;
+  for (; i < to && i % 4 != 0; i++)
+    set_one(s, i, spin, boundary);
+  for (; i + 4 <= to; i += 4)
+    set_four(s, i, spin, boundary);
+  for (; i < to; i++)
+    set_one(s, i, spin, boundary);
 }
 
 // One colour: the largest of what its blocks return.
