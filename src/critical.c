@@ -136,7 +136,8 @@ double tal_largest_overlap(const tal_sim *sim, int64_t *grain) {
   *grain = -1;
   for (size_t c = 0; c < s->count; c++) {
     const pair_gap gap = pair_of(sim, c);
-    const double smaller = fmin(g->r[s->i[c]], g->r[s->j[c]]), within = gap.reach - largest * smaller;
+    const double ri = g->r[s->i[c]], rj = g->r[s->j[c]], smaller = ri < rj ? ri : rj;
+    const double within = gap.reach - largest * smaller;
     if (within > 0 && gap.square < within * within) {
       largest = (gap.reach - sqrt(gap.square)) / smaller;
       *grain = g->id[s->i[c]];

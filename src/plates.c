@@ -34,14 +34,17 @@ void tal_plates_mark(tal_sim *sim) {
   const double reach = 0.01 * 2 * sim->constants.mean_radius;
   unsigned char *side = sim->graph.side = tal_alloc(g->count, 1);
   const tal_contacts *slots = &sim->pairs;
+  for (size_t i = 0; i < g->count; i++)
+    side[i] = g->y[i] - g->r[i] < bottom->y0 + reach ? 1 : g->y[i] + g->r[i] > top->y0 - reach ? 2 : 0;
+  unsigned char *held = tal_alloc(g->count, 1);
   for (size_t c = 0; c < slots->count; c++) {
     int32_t i = slots->i[c], j = slots->j[c];
-    if (hypot(g->x[i] - g->x[j], g->y[i] - g->y[j]) < g->r[i] + g->r[j] + reach)
-      side[i] = side[j] = 1;
+    if ((side[i] | side[j]) && hypot(g->x[i] - g->x[j], g->y[i] - g->y[j]) < g->r[i] + g->r[j] + reach)
+      held[i] = held[j] = 1;
   }
   for (size_t i = 0; i < g->count; i++)
-    if (side[i] != 0)
-      side[i] = g->y[i] - g->r[i] < bottom->y0 + reach ? 1 : g->y[i] + g->r[i] > top->y0 - reach ? 2 : 0;
+    side[i] = held[i] ? side[i] : 0;
+  free(held);
 }
 
 double tal_plates_distance(const tal_sim *sim) {
