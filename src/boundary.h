@@ -8,7 +8,8 @@
 struct tal_boundary {
   const char *name;
   const char *help;
-  bool plates; // stands between plates
+  bool plates;  // stands between plates
+  bool centres; // what it applies follows from the centres of the loop's grains
   // Sets itself up when a stage begins; NULL: nothing to do.
   tal_status (*begin)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
   void (*refreshed)(tal_sim *sim); // the graph is new: settle where on the loop to act

@@ -152,8 +152,8 @@ static void penalise(tal_sim *sim, const tal_boundary_target *t) {
   tal_rows *rows = &sim->rows;
   const int32_t *node = sim->graph.loop.node;
   for (size_t k = 0; k < rows->nodes; k++) {
-    rows->velocity[2 * k] = sim->grain_records[node[k]].ux;
-    rows->velocity[2 * k + 1] = sim->grain_records[node[k]].uy;
+    rows->velocity[2 * k] = sim->grains.ux[node[k]];
+    rows->velocity[2 * k + 1] = sim->grains.uy[node[k]];
   }
   geo_tensor is = tal_rows_gradient(rows, rows->velocity);
   const double scale = sim->run.penalty / (rows->thickness * rows->area);

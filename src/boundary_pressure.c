@@ -118,5 +118,6 @@ static void apply(tal_sim *sim) {
 const tal_boundary tal_boundary_pressure = {.name = "pressure",
                                             .help = "pressure on the grains of the Delaunay boundary",
                                             .plates = true,
+                                            .centres = true,
                                             .refreshed = refreshed,
                                             .apply = apply};

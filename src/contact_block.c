@@ -33,12 +33,25 @@ tal_sweep tal_sweep_of(const tal_sim *sim, double dt) {
                                    .tangential_ratio = sim->constants.tangential_ratio}};
 }
 
-// Centres, and velocities where the law needs them.
-TAL_KERNEL void fetch_translation(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j,
+void tal_places_of(const tal_contacts *slots, size_t start, int count, size_t origin, size_t mask, tal_places *places) {
+  const int32_t *restrict i = slots->i + start, *restrict j = slots->j + start;
+  const uint32_t first = (uint32_t)origin, within = (uint32_t)mask;
+  for (int k = 0; k < count; k++) {
+    places->i[k] = (((uint32_t)i[k] - first) & within) * (uint32_t)sizeof(tal_grain_record);
+    places->j[k] = (((uint32_t)j[k] - first) & within) * (uint32_t)sizeof(tal_grain_record);
+  }
+  for (int k = count; k < TAL_BLOCK; k++) {
+    places->i[k] = places->i[count - 1];
+    places->j[k] = places->j[count - 1];
+  }
+}
+
+// Centres, and velocities where the law needs them. i, j: records.
+TAL_KERNEL void fetch_translation(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4],
                                   int k, unsigned effects) {
   tal_lanes v[4];
   for (int m = 0; m < 4; m++)
-    v[m] = *(const tal_lanes *)&record[i[m]].x - *(const tal_lanes *)&record[j[m]].x;
+    v[m] = *(const tal_lanes *)&i[m]->x - *(const tal_lanes *)&j[m]->x;
   tal_lanes_turn(v);
   *(tal_lanes *)&b->dx[k] = v[0];
   *(tal_lanes *)&b->dy[k] = v[1];
@@ -48,36 +61,40 @@ TAL_KERNEL void fetch_translation(meetings *b, const tal_grain_record *record, c
   }
 }
 
-TAL_KERNEL void fetch_spin(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j, int k) {
+TAL_KERNEL void fetch_spin(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4], int k) {
   tal_lanes_pair p[4];
   tal_lanes v[2];
   for (int m = 0; m < 4; m++)
-    p[m] = *(const tal_lanes_pair *)&record[i[m]].spin + *(const tal_lanes_pair *)&record[j[m]].spin;
+    p[m] = *(const tal_lanes_pair *)&i[m]->spin + *(const tal_lanes_pair *)&j[m]->spin;
   tal_lanes_turn_pairs(p, v);
   *(tal_lanes *)&b->spins[k] = v[0];
   *(tal_lanes *)&b->speeds[k] = v[1];
 }
 
-TAL_KERNEL void fetch_middle(meetings *b, const tal_grain_record *record, const int32_t *i, const int32_t *j, int k) {
+TAL_KERNEL void fetch_middle(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4],
+                             int k) {
   tal_lanes_pair p[4];
   tal_lanes v[2];
   for (int m = 0; m < 4; m++)
-    p[m] = *(const tal_lanes_pair *)&record[i[m]].hx - *(const tal_lanes_pair *)&record[j[m]].hx;
+    p[m] = *(const tal_lanes_pair *)&i[m]->hx - *(const tal_lanes_pair *)&j[m]->hx;
   tal_lanes_turn_pairs(p, v);
   *(tal_lanes *)&b->hx[k] = v[0];
   *(tal_lanes *)&b->hy[k] = v[1];
 }
 
-// Whole groups of four: the arrays of slots go on for a while after the last one (tal_neighbours_rebuild).
-TAL_KERNEL void fetch(meetings *b, const tal_sim *sim, size_t start, int count, unsigned effects) {
-  const int32_t *slot_i = sim->pairs.i + start, *slot_j = sim->pairs.j + start;
-  const tal_grain_record *record = sim->grain_records;
+// Whole groups of four.
+TAL_KERNEL void fetch(meetings *b, const tal_grain_record *record, const tal_places *at, int count, unsigned effects) {
   for (int k = 0; k < count; k += 4) {
-    fetch_translation(b, record, slot_i + k, slot_j + k, k, effects);
+    const tal_grain_record *i[4], *j[4];
+    for (int m = 0; m < 4; m++) {
+      i[m] = tal_at(record, at->i[k + m]);
+      j[m] = tal_at(record, at->j[k + m]);
+    }
+    fetch_translation(b, i, j, k, effects);
     if (effects & TAL_EFFECT_SPRING)
-      fetch_middle(b, record, slot_i + k, slot_j + k, k);
+      fetch_middle(b, i, j, k);
     if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_FRICTION))
-      fetch_spin(b, record, slot_i + k, slot_j + k, k);
+      fetch_spin(b, i, j, k);
   }
 }
 
@@ -134,7 +151,8 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
       m.approach = -(x * ux[k] + y * uy[k]);
     }
     if (effects & TAL_EFFECT_SPRING) {
-      m.slip_distance = dt * tal_slip_speed(x, y, hx[k], hy[k], half_overlap, speeds[k], spins[k], effects);
+      // + 0: where dt is 0 a force of -0 stays -0
+      m.slip_distance = dt * tal_slip_speed(x, y, hx[k], hy[k], half_overlap, speeds[k], spins[k], effects) + 0.0;
       m.spring = spring[k];
       m.spring_stiffness = spring_stiffness[k];
     }
@@ -163,10 +181,10 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
     rub(&r, sweep, count, out);
 }
 
-TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out,
-                      unsigned effects) {
+TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
+                      size_t start, int count, tal_force_block *out, unsigned effects) {
   meetings b;
-  fetch(&b, sim, start, count, effects);
+  fetch(&b, record, at, count, effects);
   work_out(&b, &sim->pairs, sweep, start, count, out, effects);
 }
 
@@ -177,12 +195,13 @@ TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, size_t start, int co
   DAMPED_OR_NOT(mask) TURNS_OR_NOT((mask) | TAL_EFFECT_REGULARISED) TURNS_OR_NOT((mask) | TAL_EFFECT_SPRING)
 #define EVERY_VARIANT EACH_FRICTION(0) EACH_FRICTION(TAL_EFFECT_HERTZ)
 
-void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, size_t start, int count, tal_force_block *out) {
+void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
+                       size_t start, int count, tal_force_block *out) {
   // without friction it is nothing to a contact that grains turn
   switch (sweep->law & TAL_EFFECT_FRICTION ? sweep->law : sweep->law & ~(unsigned)TAL_EFFECT_SPIN) {
 #define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
-    block(sim, sweep, start, count, out, (mask));                                                                      \
+    block(sim, sweep, record, at, start, count, out, (mask));                                                          \
     break;
     EVERY_VARIANT
   }

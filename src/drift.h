@@ -1,15 +1,24 @@
-// The drift of a handful of grains.
+// The drift of a handful of grains, and what the contact laws see of them afterwards.
 #ifndef TAL_DRIFT_H
 #define TAL_DRIFT_H
 
+#include "root.h"
 #include "sim.h"
 
 // Grains drifted at a time.
 enum { TAL_DRIFT_GRAINS = 64 };
 
 // First half kick, drift, prediction of the grains [start, start + count), count <= TAL_DRIFT_GRAINS, by dt [s], eqs
-// (12)-(14); what the laws shall see goes into the grain records. Returns the square of the largest speed [m^2/s^2] as
-// bits, which order like the numbers, NAN above all.
+// (12)-(14). Returns the square of the largest speed [m^2/s^2] as bits, which order like the numbers, NAN above all.
 int64_t tal_drift_group(tal_sim *sim, size_t start, int count, double dt);
+// What no grain moves further than [m] when that is the largest: what rounds off on the way is less.
+static inline double tal_drift_stride(double dt, int64_t fastest) {
+  return (1 + 1e-9) * dt * sqrt(tal_double((uint64_t)fastest));
+}
+
+// Records of drifted grains that no kick has touched yet: record[0] is that of grain `start`.
+void tal_drift_records(const tal_sim *sim, size_t start, int count, tal_grain_record *record);
+// The same of grains that have not drifted yet and stay where they are.
+void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record);
 
 #endif

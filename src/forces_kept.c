@@ -1,11 +1,13 @@
 // The force of every slot kept in a record of its own: for observers, and for friction that is solved after the sweep.
-// The last step kept nothing; its forces are worked out again from the grain records it left, to the same bits: a
-// spring that stands at its force and does not move answers with that force.
+// The last step kept nothing; its forces are worked out again from what the laws saw of the grains, to the same bits:
+// a spring that stands at its force and does not move answers with that force.
 #include "forces.h"
 
+#include "drift.h"
 #include "kick.h"
 
 #include <stdlib.h>
+#include <string.h>
 
 enum { GRAINS = TAL_KICK_GRAINS, PARALLEL_FROM = 2000 };
 
@@ -37,7 +39,9 @@ void tal_forces_forget(tal_sim *sim) {
   if (!sim->force_records)
     return;
   free(sim->force_records);
+  free(sim->grain_records);
   sim->force_records = NULL;
+  sim->grain_records = NULL;
   sim->force_capacity = 0;
   tal_contacts_hide(&sim->pairs);
   tal_grains_hide(&sim->grains);
@@ -45,23 +49,35 @@ void tal_forces_forget(tal_sim *sim) {
   tal_graph_forget_edges(&sim->graph);
 }
 
+static void see_grains(tal_sim *sim) {
+  const size_t count = sim->grains.count;
+  if (!sim->grain_records)
+    sim->grain_records = tal_alloc(count, sizeof *sim->grain_records);
+#pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
+  for (size_t start = 0; start < count; start += GRAINS)
+    tal_drift_records(sim, start, (int)(count - start < GRAINS ? count - start : GRAINS), sim->grain_records + start);
+}
+
 static void sweep_pairs(tal_sim *sim, double dt) {
-  const tal_sweep sweep = tal_sweep_of(sim, dt);
   const size_t count = sim->pairs.count;
   tal_forces_keep(sim);
+  see_grains(sim);
+  const tal_sweep sweep = tal_sweep_of(sim, dt);
 #pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
   for (size_t start = 0; start < count; start += TAL_BLOCK) {
     int here = (int)(count - start < TAL_BLOCK ? count - start : TAL_BLOCK);
     tal_force_block b = {0};
-    tal_contact_block(sim, &sweep, start, here, &b);
+    const size_t first = (size_t)sim->pairs.i[start];
+    tal_places at;
+    tal_places_of(&sim->pairs, start, here, first, UINT32_MAX, &at);
+    tal_contact_block(sim, &sweep, sim->grain_records + first, &at, start, here, &b);
     keep_block(&b, sim->force_records + start, here);
   }
 }
 
 // One grain-wall slot: the wall's own velocity counts, its lever arm is r - d.
-static void wall_slot(tal_sim *sim, const tal_sweep *sweep, size_t c) {
+static void wall_slot(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *g, size_t c) {
   tal_contacts *slots = &sim->wall_contacts;
-  const tal_grain_record *g = &sim->grain_records[slots->i[c]];
   const tal_wall *wall = &sim->walls.wall[slots->j[c]];
   tal_wall_point near = tal_wall_nearest(wall, g->x, g->y);
   tal_meeting m = {.overlap = slots->reach[c] - near.distance,
@@ -73,7 +89,8 @@ static void wall_slot(tal_sim *sim, const tal_sweep *sweep, size_t c) {
   double ux = g->ux - wall->vx, uy = g->uy - wall->vy, hx = g->hx - wall->vx, hy = g->hy - wall->vy;
   m.approach = -(near.nx * ux + near.ny * uy);
   m.slip = tal_slip_speed(near.nx, near.ny, ux, uy, m.overlap, g->r_spin, g->spin, sim->effects);
-  m.slip_distance = sweep->dt * tal_slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r_spin, g->spin, sim->effects);
+  m.slip_distance =
+      sweep->dt * tal_slip_speed(near.nx, near.ny, hx, hy, m.overlap, g->r_spin, g->spin, sim->effects) + 0.0;
   tal_law_force f = tal_contact_law(m, sweep->constants, sweep->law);
   slots->nx[c] = near.nx;
   slots->ny[c] = near.ny;
@@ -87,22 +104,23 @@ static void wall_slot(tal_sim *sim, const tal_sweep *sweep, size_t c) {
   }
 }
 
-void tal_forces_sweep_walls(tal_sim *sim, double dt) {
-  const tal_sweep sweep = tal_sweep_of(sim, dt);
-  for (size_t c = 0; c < sim->wall_contacts.count; c++)
-    wall_slot(sim, &sweep, c);
+void tal_forces_sweep_walls(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, size_t mask,
+                            size_t first, size_t end) {
+  for (size_t c = first; c < end; c++)
+    wall_slot(sim, sweep, &record[(size_t)sim->wall_contacts.i[c] & mask], c);
 }
 
 void tal_forces_sweep(tal_sim *sim, double dt) {
   sweep_pairs(sim, dt);
-  tal_forces_sweep_walls(sim, dt);
+  const tal_sweep sweep = tal_sweep_of(sim, dt);
+  tal_forces_sweep_walls(sim, &sweep, sim->grain_records, SIZE_MAX, 0, sim->wall_contacts.count);
 }
 
 void tal_forces_see_now(tal_sim *sim) {
   const tal_grains *g = &sim->grains;
-  for (size_t i = 0; i < g->count; i++)
-    sim->grain_records[i] = (tal_grain_record){g->x[i],  g->y[i],  g->vx[i],    g->vy[i],
-                                               g->vx[i], g->vy[i], g->omega[i], g->r[i] * g->omega[i]};
+  memcpy(g->ux, g->vx, g->count * sizeof *g->ux);
+  memcpy(g->uy, g->vy, g->count * sizeof *g->uy);
+  memcpy(g->spin, g->omega, g->count * sizeof *g->spin);
 }
 
 // ---- slots ----------------------------------------------------------------------------------------------------------

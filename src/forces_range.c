@@ -1,26 +1,128 @@
-// The hot loop. Slots ascend by (i, j): a block of contacts is worked out, its forces are added to the sums of both
-// grains, and grains below the next slot's i are complete and kicked while their sums are still in the cache. Only the
-// sums of the grains between the two ends of a contact are alive at a time: a ring holds them. Measured by
-// tests/bench/bench_step.c.
+// The hot loop, one pass over memory. Slots ascend by (i, j): grains up to the last partner of a block of contacts are
+// drifted and what the laws see of them goes into a ring of records; the block is worked out, its forces are added to
+// the sums of both grains, and grains below the next slot's i are complete and kicked while their sums are still in the
+// cache. Only the grains between the two ends of a contact are alive at a time: two rings hold their records and sums.
+// Measured by tests/bench/bench_step.c.
 //
 // Each thread takes a range of grains. Contacts that reach into it from below belong to another thread's range: before
 // anyone moves a history, each thread works out the slots just below its range for its own grains' sake. So every
-// grain sums the same numbers in the same order, whatever the number of threads.
+// grain sums the same numbers in the same order, whatever the number of threads. The records of other threads' grains
+// are taken before anyone moves a grain.
 #include "forces_range.h"
 
+#include "drift.h"
+#include "forces.h"
 #include "kick.h"
 
+#include <string.h>
+
+_Static_assert(sizeof(tal_grain_record) == sizeof(tal_force_record), "the rings have the same places");
+
 enum { GRAINS = TAL_KICK_GRAINS };
+// A cache line of doubles, and the grains and slots that memory is asked for at a time. Smaller samples than ASK_FROM
+// grains stay in some cache.
+enum { LINE = 8, ASK_GRAINS = LINE, ASK_SLOTS = 2 * LINE, ASK_FROM = 16000 };
+// How far ahead of use, in grains and slots.
+enum { AHEAD_GRAINS = GRAINS, AHEAD_SLOTS = 4 * TAL_BLOCK };
+
+// Arrays that a step goes through.
+typedef struct arrays {
+  const double *array[18];
+  int count;
+} arrays;
 
 typedef struct range {
   tal_sim *sim;
   tal_sweep sweep;
-  tal_force_record *sum; // ring; grain g at g & mask, zero where no contact has been added
+  tal_force_record *sum;    // ring; grain g at g & mask, zero where no contact has been added
+  tal_grain_record *record; // ring, the same places
+  tal_grain_record *beyond; // records of the grains from `last` on, other threads'
   size_t mask;
-  size_t done;    // grains below are dealt with
-  size_t fetched; // records below are asked for
-  bool kicks;     // grains are kicked when complete, else forgotten
+  size_t last;  // grains below are this thread's
+  size_t seen;  // grains below have drifted and have a record
+  size_t done;  // grains below are dealt with
+  size_t asked; // memory has been asked for grains below
+  arrays of_grains, of_slots;
+  bool kicks; // grains are kicked when complete, else forgotten
+  int64_t fastest;
 } range;
+
+// ---- records --------------------------------------------------------------------------------------------------------
+
+// Records of the grains below `end`, whole handfuls.
+static void see(range *t, size_t end) {
+  const size_t all = t->sim->grains.count;
+  for (; t->seen < end && t->seen < all; t->seen += GRAINS) {
+    const int count = (int)(all - t->seen < GRAINS ? all - t->seen : GRAINS);
+    tal_grain_record *to = t->record + (t->seen & t->mask);
+    if (t->seen >= t->last) {
+      memcpy(to, t->beyond + (t->seen - t->last), (size_t)count * sizeof *to);
+      continue;
+    }
+    if (t->sweep.drifts)
+      tal_drift_group(t->sim, t->seen, count, t->sweep.dt);
+    tal_drift_records(t->sim, t->seen, count, to);
+  }
+}
+
+// Records of other threads' grains from `start` on, below `end`; grain g's at to[(g - first) & mask].
+static void foresee(const range *t, size_t start, size_t end, tal_grain_record *to, size_t first, size_t mask) {
+  const size_t all = t->sim->grains.count;
+  for (; start < end && start < all; start += GRAINS) {
+    const int count = (int)(all - start < GRAINS ? all - start : GRAINS);
+    if (t->sweep.drifts)
+      tal_drift_foresee(t->sim, start, count, t->sweep.dt, to + ((start - first) & mask));
+    else
+      tal_drift_records(t->sim, start, count, to + ((start - first) & mask));
+  }
+}
+
+// ---- memory ---------------------------------------------------------------------------------------------------------
+
+static void put(arrays *a, const double *array) {
+  if (array)
+    a->array[a->count++] = array;
+}
+
+static void find_arrays(range *t) {
+  const tal_grains *g = &t->sim->grains;
+  const tal_contacts *s = &t->sim->pairs;
+  const unsigned effects = t->sim->effects;
+  const double *const move[] = {g->x, g->y, g->vx, g->vy, g->ux, g->uy, g->fx, g->fy, g->inverse_mass};
+  const double *const turn[] = {g->theta, g->omega, g->spin, g->torque, g->inverse_inertia, g->r};
+  const double *const past[] = {s->reach, s->stiffness, s->damping, s->spring, s->spring_stiffness};
+  if (g->count < ASK_FROM)
+    return;
+  for (size_t m = 0; m < sizeof move / sizeof *move; m++)
+    put(&t->of_grains, move[m]);
+  for (size_t m = 0; effects & TAL_EFFECT_SPIN && m < sizeof turn / sizeof *turn; m++)
+    put(&t->of_grains, turn[m]);
+  put(&t->of_grains, effects & TAL_EFFECT_BOUNDARY ? g->bx : NULL);
+  put(&t->of_grains, effects & TAL_EFFECT_BOUNDARY ? g->by : NULL);
+  put(&t->of_grains, effects & TAL_EFFECT_GRAVITY ? g->mass : NULL);
+  for (size_t m = 0; m < sizeof past / sizeof *past; m++)
+    put(&t->of_slots, past[m]);
+}
+
+// Asks for what is needed soon, a few lines at a time between sums: many at once would be more than the processor can
+// wait for beside its work, and by itself it foresees too little of so many arrays.
+static void ask(range *t, size_t slot) {
+  const tal_contacts *s = &t->sim->pairs;
+  const size_t grain = t->asked > t->seen ? t->asked : t->seen;
+  if (!t->of_grains.count)
+    return;
+  slot += AHEAD_SLOTS;
+  __builtin_prefetch(s->i + slot);
+  __builtin_prefetch(s->j + slot);
+  for (int m = 0; m < t->of_slots.count; m++)
+    for (int line = 0; line < ASK_SLOTS; line += LINE)
+      __builtin_prefetch(t->of_slots.array[m] + slot + line, 1);
+  if (grain >= t->seen + AHEAD_GRAINS || grain >= t->last)
+    return;
+  for (int m = 0; m < t->of_grains.count; m++)
+    __builtin_prefetch(t->of_grains.array[m] + grain, 1);
+  t->asked = grain + ASK_GRAINS;
+}
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
 
@@ -28,33 +130,34 @@ typedef struct halves {
   tal_lanes first, second; // of a force record
 } halves;
 
-TAL_KERNEL void add_group(range *t, const int32_t *i, const int32_t *j, const tal_force_block *b, int k, int count,
-                          bool friction) {
+TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block *b, int k, int count, bool friction) {
   const tal_lanes signs = {-1, -1, 1, 1}; // on j the vectors change sign, the torque does not
   tal_lanes first[4], second[4];
   tal_force_block_turn(b, k, first, second);
   for (int m = 0; m < count; m++) {
-    halves *at_i = (halves *)&t->sum[(size_t)i[k + m] & t->mask], *at_j = (halves *)&t->sum[(size_t)j[k + m] & t->mask];
-    at_i->first += first[m];
-    at_j->first -= first[m];
-    if (friction) {
+    halves *at_i = tal_at(t->sum, at->i[k + m]), *at_j = tal_at(t->sum, at->j[k + m]);
+    at_i->first += first[m]; // stores to one line side by side: the other order costs a tenth of a step
+    if (friction)
       at_i->second += second[m];
+    at_j->first -= first[m];
+    if (friction)
       at_j->second += signs * second[m];
-    }
   }
 }
 
-static void add_block(range *t, const tal_force_block *b, size_t start, int count) {
-  const int32_t *i = t->sim->pairs.i + start, *j = t->sim->pairs.j + start;
+static void add_block(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count) {
   const bool friction = t->sweep.law & TAL_EFFECT_FRICTION;
   const int whole = count & ~3;
-  for (int k = 0; k < whole; k += 4)
+  for (int k = 0; k < whole; k += 4) {
+    if (k % ASK_SLOTS == 0)
+      ask(t, start + (size_t)k);
     if (friction)
-      add_group(t, i, j, b, k, 4, true);
+      add_group(t, at, b, k, 4, true);
     else
-      add_group(t, i, j, b, k, 4, false);
+      add_group(t, at, b, k, 4, false);
+  }
   if (whole < count)
-    add_group(t, i, j, b, whole, count - whole, friction);
+    add_group(t, at, b, whole, count - whole, friction);
 }
 
 // Takes the sums of grains off the ring.
@@ -79,14 +182,26 @@ static void take_sums(range *t, size_t start, int count, tal_force_block *out) {
 
 // ---- ranges ---------------------------------------------------------------------------------------------------------
 
+// The walls of a handful of grains, and its kick.
+static int64_t finish(range *t, int count, tal_force_block *sums) {
+  see(t, t->done + (size_t)count);
+  if (t->sim->effects & TAL_EFFECT_WALLS) {
+    const int32_t *first = t->sim->neighbours.wall_first + t->done;
+    tal_forces_sweep_walls(t->sim, &t->sweep, t->record, t->mask, (size_t)first[0], (size_t)first[count]);
+  }
+  return tal_kick(t->sim, sums, t->done, count, t->sweep.dt);
+}
+
 // The grains below `end` are complete; those that do not fill a handful may wait.
 static void complete(range *t, size_t end, bool all) {
   while (end > t->done && (all || end - t->done >= GRAINS)) {
     size_t count = end - t->done < GRAINS ? end - t->done : GRAINS;
     tal_force_block sums;
     take_sums(t, t->done, (int)count, &sums);
-    if (t->kicks)
-      tal_kick(t->sim, &sums, t->done, (int)count, t->sweep.dt);
+    if (t->kicks) {
+      int64_t fastest = finish(t, (int)count, &sums);
+      t->fastest = fastest > t->fastest ? fastest : t->fastest;
+    }
     t->done += count;
   }
 }
@@ -104,13 +219,6 @@ static size_t slot_of(const tal_contacts *slots, size_t grain) {
   return first;
 }
 
-// Asks for the records of all partners of the next slots: partners come in no order that the processor would foresee.
-static void fetch_ahead(range *t, size_t grain) {
-  const size_t last = grain + t->sim->neighbours.span + TAL_BLOCK, count = t->sim->grains.count;
-  for (; t->fetched < last && t->fetched < count; t->fetched++)
-    __builtin_prefetch(&t->sim->grain_records[t->fetched]);
-}
-
 // All slots whose i lies in [t->done, last).
 static void work_off(range *t, size_t last) {
   const tal_contacts *slots = &t->sim->pairs;
@@ -118,23 +226,38 @@ static void work_off(range *t, size_t last) {
   for (size_t start = slot_of(slots, t->done); start < end; start += TAL_BLOCK) {
     int count = (int)(end - start < TAL_BLOCK ? end - start : TAL_BLOCK);
     tal_force_block b;
+    tal_places at;
     complete(t, (size_t)slots->i[start], false);
-    fetch_ahead(t, (size_t)slots->i[start]);
-    tal_contact_block(t->sim, &t->sweep, start, count, &b);
-    add_block(t, &b, start, count);
+    see(t, (size_t)slots->i[start + (size_t)count - 1] + t->sim->neighbours.span + 1);
+    tal_places_of(slots, start, count, 0, t->mask, &at);
+    tal_contact_block(t->sim, &t->sweep, t->record, &at, start, count, &b);
+    add_block(t, &at, &b, start, count);
   }
   complete(t, last, true);
 }
 
-void tal_forces_range(tal_sim *sim, const tal_sweep *sweep, int part, int parts) {
+int64_t tal_forces_range(tal_sim *sim, const tal_sweep *sweep, int part, int parts) {
   const size_t ring = sim->neighbours.ring, span = sim->neighbours.span;
   const size_t groups = (sim->grains.count + GRAINS - 1) / GRAINS;
   const size_t first = groups * (size_t)part / (size_t)parts * GRAINS;
   const size_t beyond = groups * (size_t)(part + 1) / (size_t)parts * GRAINS;
   const size_t last = beyond < sim->grains.count ? beyond : sim->grains.count;
-  range t = {.sim = sim, .sweep = *sweep, .sum = sim->sums + (size_t)part * ring, .mask = ring - 1};
-  t.done = t.fetched = first > span ? first - span : 0;
+  range t = {.sim = sim,
+             .sweep = *sweep,
+             .sum = sim->sums + (size_t)part * ring,
+             .record = sim->rings + 2 * (size_t)part * ring,
+             .mask = ring - 1,
+             .last = last,
+             .seen = first};
+  t.beyond = t.record + ring;
+  t.done = first > span ? first - span : 0;
+  find_arrays(&t);
   t.sweep.moves = false;
+  foresee(&t, t.done / GRAINS * GRAINS, first, t.record, 0, t.mask);
+  foresee(&t, last, last + span, t.beyond, last, SIZE_MAX);
+  if (parts > 1) {
+#pragma omp barrier
+  }
   work_off(&t, first);
   if (parts > 1 && sweep->law & TAL_EFFECT_SPRING) { // the only history
 #pragma omp barrier
@@ -144,4 +267,5 @@ void tal_forces_range(tal_sim *sim, const tal_sweep *sweep, int part, int parts)
   work_off(&t, last);
   t.kicks = false;
   complete(&t, last + span, true); // what other threads' grains were given
+  return t.fastest;
 }

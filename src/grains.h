@@ -25,6 +25,9 @@
   X(double, inverse_inertia, "1/(kg m^2)", STATE, "0 where the spin is held")                                          \
   X(double, window_vx, "m/s", STATE, "velocity when the window of mean forces began")                                  \
   X(double, window_vy, "m/s", STATE, "velocity when the window of mean forces began")                                  \
+  X(double, ux, "m/s", WORK, "velocity that the laws saw last: predicted for the instant of x")                        \
+  X(double, uy, "m/s", WORK, "velocity that the laws saw last: predicted for the instant of y")                        \
+  X(double, spin, "rad/s", WORK, "spin that the laws saw last; for the spring law in the middle of the step")          \
   X(double, bx, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
   X(double, by, "N", WORK, "boundary force (pressure on the loop) at the last evaluation")                             \
   X(double, rx, "N", SEEN, "observed resultant of contacts and boundaries, gravity left out")                          \

@@ -9,7 +9,7 @@
 
 // X(result, name, arguments): tal_<name> of the headers above.
 #define TAL_HOT_FUNCTIONS(X)                                                                                           \
-  X(void, forces_range, (tal_sim * sim, const tal_sweep *sweep, int part, int parts))                                  \
+  X(int64_t, forces_range, (tal_sim * sim, const tal_sweep *sweep, int part, int parts))                               \
   X(int64_t, drift_group, (tal_sim * sim, size_t start, int count, double dt))                                         \
   X(double, implicit_take,                                                                                             \
     (const tal_implicit_solve *s, tal_implicit_pass pass, size_t start, int count, double factor))                     \

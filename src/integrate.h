@@ -17,8 +17,8 @@ struct tal_integrator {
 
 const tal_integrator *tal_integrator_find(const char *name);
 
-// The part of a step before the forces, eqs (12)-(14): first half kick, drift of grains and walls, predicted velocities
-// into the grain records, neighbour list, boundary forces.
+// The part of a step before the forces, eqs (12)-(14): first half kick, drift of grains, predicted velocities,
+// neighbour list, boundary forces. The walls have drifted.
 void tal_integrate_drift(tal_sim *sim, double dt);
 // Time [s] over which the forces of this instant act: half of this step and half of the next.
 static inline double tal_integrate_credit(const tal_sim *sim) {

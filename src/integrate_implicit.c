@@ -9,8 +9,11 @@
 
 #include "effects.h"
 #include "implicit.h"
+#include "walls_load.h"
 
 static void advance(tal_sim *sim) {
+  if (sim->effects & TAL_EFFECT_WALLS)
+    tal_walls_drift(sim);
   tal_integrate_drift(sim, sim->dt);
   if (sim->effects & TAL_EFFECT_IMPLICIT)
     tal_implicit_step(sim, tal_integrate_credit(sim));

@@ -2,6 +2,8 @@
 // force that acts over the two half kicks around the instant of v [eq (16)].
 #include "kick.h"
 
+#include "root.h"
+
 // Powers are added up in so many lanes.
 enum { LANES = 8 };
 
@@ -37,7 +39,8 @@ TAL_KERNEL double add_up(const double *power, int count) {
   return ((lane[0] + lane[4]) + (lane[2] + lane[6])) + ((lane[1] + lane[5]) + (lane[3] + lane[7]));
 }
 
-TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, int count, double dt, unsigned effects) {
+TAL_KERNEL int64_t kick(tal_sim *sim, const tal_force_block *sums, size_t start, int count, double dt,
+                        unsigned effects) {
   tal_grains *g = &sim->grains;
   const double *restrict ex = sums->force[0], *restrict ey = sums->force[1], *restrict dx = sums->force[2];
   const double *restrict dy = sums->force[3], *restrict tx = sums->force[4], *restrict ty = sums->force[5];
@@ -51,8 +54,10 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
   const int whole = (count + LANES - 1) / LANES * LANES;
   for (int k = count; k < whole; k++)
     p.friction[k] = p.damping[k] = p.boundary[k] = p.held[k] = 0;
-  const double gravity_x = sim->scene->gravity[0], gravity_y = sim->scene->gravity[1], half = 0.5 * dt;
-#pragma omp simd
+  const double gravity_x = sim->scene->gravity[0], gravity_y = sim->scene->gravity[1], half = 0.5 * dt,
+               half_next = 0.5 * sim->dt_next;
+  int64_t fastest = 0;
+#pragma omp simd reduction(max : fastest)
   for (int k = 0; k < count; k++) {
     double x = ex[k] + dx[k], y = ey[k] + dy[k];
     if (effects & TAL_EFFECT_FRICTION) {
@@ -67,7 +72,10 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
       x += mass[k] * gravity_x;
       y += mass[k] * gravity_y;
     }
-    double u = vx[k] + half * (x * inverse_mass[k]), v = vy[k] + half * (y * inverse_mass[k]);
+    double ax = x * inverse_mass[k], ay = y * inverse_mass[k];
+    double u = vx[k] + half * ax, v = vy[k] + half * ay;
+    int64_t speed = tal_speed_bits(u + half_next * ax, v + half_next * ay);
+    fastest = speed > fastest ? speed : fastest;
     fx[k] = x;
     fy[k] = y;
     vx[k] = u;
@@ -98,6 +106,7 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
                         .damping = effects & TAL_EFFECT_DAMPING ? add_up(p.damping, whole) : 0,
                         .boundary = effects & TAL_EFFECT_BOUNDARY ? add_up(p.boundary, whole) : 0,
                         .held = effects & TAL_EFFECT_HELD ? add_up(p.held, whole) : 0};
+  return fastest;
 }
 
 // Every combination, so that what is absent costs nothing; but held motion, which takes the mask at run time.
@@ -107,7 +116,7 @@ TAL_KERNEL void kick(tal_sim *sim, const tal_force_block *sums, size_t start, in
 #define TURNS_OR_NOT(mask)   HEAVY_OR_NOT(mask) HEAVY_OR_NOT((mask) | TAL_EFFECT_SPIN)
 #define EVERY_VARIANT        TURNS_OR_NOT(0) TURNS_OR_NOT(TAL_EFFECT_REGULARISED)
 
-void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt) {
+int64_t tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, double dt) {
   unsigned effects = sim->effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_SPIN | TAL_EFFECT_GRAVITY | TAL_EFFECT_BOUNDARY |
                                      TAL_EFFECT_HELD);
   if (sim->effects & TAL_EFFECT_FRICTION)
@@ -117,11 +126,10 @@ void tal_kick(tal_sim *sim, tal_force_block *sums, size_t start, int count, doub
   switch (effects) {
 #define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
-    kick(sim, sums, start, count, dt, (mask));                                                                         \
-    break;
+    return kick(sim, sums, start, count, dt, (mask));
     EVERY_VARIANT
   default:
-    kick(sim, sums, start, count, dt, effects);
+    return kick(sim, sums, start, count, dt, effects);
   }
 }
 

@@ -120,9 +120,8 @@ static double viscosity(const tal_sim *sim, const tal_bead_contact *c) {
 static void add_contact(tal_sim *sim, tal_bead_contact *c) {
   tal_membrane *m = &sim->membrane;
   tal_grains *g = &sim->grains;
-  const tal_grain_record *i = &sim->grain_records[c->grain];
-  const size_t b = (size_t)c->bead;
-  double dx = m->x[b] - i->x, dy = m->y[b] - i->y, distance = sqrt(dx * dx + dy * dy);
+  const size_t b = (size_t)c->bead, i = (size_t)c->grain;
+  double dx = m->x[b] - g->x[i], dy = m->y[b] - g->y[i], distance = sqrt(dx * dx + dy * dy);
   c->overlap = m->r[b] + g->r[c->grain] - distance;
   c->fe = c->fd = 0;
   if (c->overlap <= 0)
@@ -131,7 +130,7 @@ static void add_contact(tal_sim *sim, tal_bead_contact *c) {
   c->ny = dy / distance;
   tal_meeting meeting = {.overlap = c->overlap, .stiffness = c->stiffness};
   c->fe = tal_contact_law(meeting, (tal_law_constants){0}, sim->effects & TAL_EFFECT_HERTZ).fe;
-  double approach = -(c->nx * (m->ux[b] - i->ux) + c->ny * (m->uy[b] - i->uy));
+  double approach = -(c->nx * (m->ux[b] - g->ux[i]) + c->ny * (m->uy[b] - g->uy[i]));
   c->fd = fmax(-c->fe, viscosity(sim, c) * approach);
   double fx = (c->fe + c->fd) * c->nx, fy = (c->fe + c->fd) * c->ny;
   m->rx[b] += fx;

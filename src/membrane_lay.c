@@ -122,8 +122,8 @@ bool tal_membrane_lay(tal_sim *sim, const tal_scene_membrane *plan) {
   tal_membrane_init(&sim->membrane, 2 * (links + 1));
   place_chain(sim, plan, 0, links, -1);
   place_chain(sim, plan, links + 1, links, +1);
-  for (size_t i = 0; i < g->count; i++) // the grains stand still
-    sim->grain_records[i] = (tal_grain_record){.x = g->x[i], .y = g->y[i]};
+  memset(g->ux, 0, g->count * sizeof *g->ux); // the grains stand still
+  memset(g->uy, 0, g->count * sizeof *g->uy);
   bool rests = settle(sim);
   memset(g->bx, 0, g->count * sizeof *g->bx); // of the laying
   memset(g->by, 0, g->count * sizeof *g->by);

@@ -79,19 +79,20 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots, bool sol
   }
 }
 
-// A ring holds the sums of all grains from the first that is not yet complete to the last partner of a block.
+// A ring holds all grains from the first that is not yet complete to the last partner that a block may have, and
+// handfuls at both ends.
 static void measure_ring(tal_sim *sim) {
   const tal_contacts *slots = &sim->pairs;
   const size_t block = TAL_BLOCK, waiting = TAL_BLOCK;
-  size_t span = 0, held = 0;
+  size_t span = 0, length = 0;
   for (size_t c = 0; c < slots->count; c++) {
-    size_t j = (size_t)slots->j[c], first = (size_t)slots->i[c < block ? 0 : c - block + 1];
-    span = j - (size_t)slots->i[c] > span ? j - (size_t)slots->i[c] : span;
-    held = j - first > held ? j - first : held;
+    size_t i = (size_t)slots->i[c], first = (size_t)slots->i[c < block ? 0 : c - block + 1];
+    span = (size_t)slots->j[c] - i > span ? (size_t)slots->j[c] - i : span;
+    length = i - first > length ? i - first : length;
   }
   sim->neighbours.span = span;
   sim->neighbours.ring = 1;
-  while (sim->neighbours.ring < held + waiting)
+  while (sim->neighbours.ring < length + span + 1 + 2 * waiting)
     sim->neighbours.ring *= 2;
 }
 
@@ -207,8 +208,6 @@ static void list_all(tal_sim *sim) {
   if (n->grain_capacity != g->count) {
     free(n->wall_first);
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
-    free(sim->grain_records);
-    sim->grain_records = tal_alloc(g->count, sizeof *sim->grain_records);
     free(sim->powers);
     sim->powers = tal_alloc(g->count / TAL_KICK_GRAINS + 1, sizeof *sim->powers);
     n->grain_capacity = g->count;
@@ -275,16 +274,26 @@ static bool walls_changed(const tal_sim *sim) {
 
 // Adding up the fastest grain's steps bounds the displacements; they are looked at when the bound no longer does, and
 // now and then, lest round-off in coordinates adds up. That a look is due follows from the motion alone.
+bool tal_neighbours_hold(tal_sim *sim, double step) {
+  tal_neighbours *n = &sim->neighbours;
+  const double moved = n->moved + step;
+  if (walls_changed(sim) || n->unseen + 1 >= LOOK_EVERY ||
+      !(moved + fmax(moved, largest_wall_displacement(sim)) < sim->constants.skin))
+    return false;
+  n->stride = step;
+  n->moved = moved;
+  n->unseen++;
+  return true;
+}
+
 bool tal_neighbours_stale(tal_sim *sim, double step) {
   tal_neighbours *n = &sim->neighbours;
-  const double walls = largest_wall_displacement(sim);
+  if (tal_neighbours_hold(sim, step))
+    return false;
   n->stride = step;
   if (walls_changed(sim))
     return true;
-  n->moved += step;
-  n->unseen++;
-  if (n->unseen < LOOK_EVERY && n->moved + fmax(n->moved, walls) < sim->constants.skin)
-    return false;
+  const double walls = largest_wall_displacement(sim);
   n->moved = sqrt(largest_displacement(sim));
   n->unseen = 0;
   return !(n->moved + fmax(n->moved, walls) < sim->constants.skin);

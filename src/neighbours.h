@@ -14,7 +14,7 @@ typedef struct tal_neighbours {
   int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
   size_t grain_capacity;
   size_t span;   // largest j - i of the slots
-  size_t ring;   // grains whose sums the hot loop must hold at a time, a power of two
+  size_t ring;   // grains that the hot loop must hold at a time, a power of two
   double moved;  // [m] no grain has moved further than this since the list was built
   double stride; // [m] no grain moved further than this in the last step
   int unseen;    // steps since the displacements were looked at
@@ -31,6 +31,9 @@ void tal_neighbours_forget(tal_neighbours *neighbours);
 // Makes the list of a restored run again: that of the centres it was last built from, so that the order of the contacts
 // and the moment of the next rebuild are those of the unbroken run.
 void tal_neighbours_restore(struct tal_sim *sim);
+// Before or after a drift in which no grain moves by more than `step` [m] and after that of the walls: true, and the
+// step is taken into account, when that much is enough to know that no two bodies off the list meet.
+bool tal_neighbours_hold(struct tal_sim *sim, double step);
 // After a step in which no grain has moved by more than `step` [m]: true when two bodies not on the list may have met
 // since it was built, a wall has come or gone, or a coordinate is no number.
 bool tal_neighbours_stale(struct tal_sim *sim, double step);

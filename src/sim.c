@@ -137,6 +137,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   *out = NULL;
   tal_sim *sim = tal_alloc(1, sizeof *sim);
   sim->scene = scene;
+  sim->next_stride = (double)NAN;
   sim->hot = tal_hot_best();
   tal_status status = make_grains(sim, err);
   if (status) {
@@ -185,6 +186,7 @@ void tal_sim_free(tal_sim *sim) {
   free(sim->grain_records);
   free(sim->force_records);
   free(sim->sums);
+  free(sim->rings);
   free(sim->powers);
   tal_graph_clear(&sim->graph);
   free(sim);
@@ -324,6 +326,7 @@ void tal_sim_restored(tal_sim *sim) {
   sim->stage = plan ? tal_stage_find(plan->kind) : NULL;
   sim->boundary = NULL;
   sim->boundary_moved = true;
+  sim->next_stride = (double)NAN;
   if (plan && !sim->run.stage_begun)
     sim->stage = NULL;
   if (sim->stage) {

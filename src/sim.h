@@ -172,11 +172,12 @@ struct tal_sim {
   tal_contacts pairs;         // grain-grain slots
   tal_contacts wall_contacts; // grain-wall slots
   tal_walls walls;
-  tal_grain_record *grain_records; // owned; [grains] what the contact laws see
+  tal_grain_record *grain_records; // owned; [grains] what the contact laws see, where someone looks
   tal_force_record *force_records; // owned; [force_capacity] what they answer, per slot, where it is kept
-  tal_force_record *sums;          // owned; [sums_capacity] rings of the hot loop, zero between steps
+  tal_force_record *sums;          // owned; [ring_capacity] rings of the hot loop, zero between steps
+  tal_grain_record *rings;         // owned; [2 ring_capacity] rings of the hot loop
   tal_kick_powers *powers;         // owned; [grains / TAL_KICK_GRAINS + 1] of this step
-  size_t force_capacity, sums_capacity;
+  size_t force_capacity, ring_capacity;
   bool forces_kept; // the force records are those of the last step or sweep
   tal_neighbours neighbours;
   tal_implicit implicit; // scratch of friction and damping solved implicitly
@@ -190,6 +191,7 @@ struct tal_sim {
   double friction;              // [-] of grain-grain contacts now (a stage may change it)
   double dt;                    // [s] of the step being taken; between two steps: of the coming one
   double dt_next;               // [s] of the step after the one being taken
+  double next_stride;           // [m] no grain will move further than this in the coming step; NAN: not known
   unsigned effects;             // mask of effects.h that the hot loop pays for
   double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
 };

@@ -138,6 +138,7 @@ tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err) {
   run->stage_done = 0;
   run->stage_begun = 1;
   run->correcting_power = 0;
+  sim->next_stride = (double)NAN;
   tal_forced_release(sim);
   tal_status status = sim->stage->begin(sim, plan, err);
   if (status)
