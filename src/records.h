@@ -1,6 +1,7 @@
 // What the hot loop reads and writes, packed to one cache line per grain: a contact fetches two lines instead of a
 // dozen. The first half of a grain record is subtracted from its partner's; of the second half the first pair too, the
-// last pair is added. Grain records are written every step, kept by nobody.
+// last pair is added. Records of grains live in rings while a step passes over them (forces_range.c), and where someone
+// looks.
 #ifndef TAL_RECORDS_H
 #define TAL_RECORDS_H
 
