@@ -24,8 +24,6 @@ void tal_integrate_drift(tal_sim *sim, double dt);
 static inline double tal_integrate_credit(const tal_sim *sim) {
   return 0.5 * (sim->dt + sim->dt_next);
 }
-// Forces of the contacts and what the boundary imposes, second half kick, ledger, eq (15).
-void tal_integrate_forces(tal_sim *sim);
 // Second half of what moves beside the grains: bodies of the boundary, loads of the walls.
 void tal_integrate_end(tal_sim *sim);
 // One step of velocity Verlet.

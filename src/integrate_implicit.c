@@ -12,13 +12,14 @@
 #include "walls_load.h"
 
 static void advance(tal_sim *sim) {
+  if (!(sim->effects & TAL_EFFECT_IMPLICIT)) { // nothing to solve
+    tal_integrate_verlet_step(sim);
+    return;
+  }
   if (sim->effects & TAL_EFFECT_WALLS)
     tal_walls_drift(sim);
   tal_integrate_drift(sim, sim->dt);
-  if (sim->effects & TAL_EFFECT_IMPLICIT)
-    tal_implicit_step(sim, tal_integrate_credit(sim));
-  else
-    tal_integrate_forces(sim);
+  tal_implicit_step(sim, tal_integrate_credit(sim));
   tal_integrate_end(sim);
 }
 

@@ -72,8 +72,9 @@ static void apply_ahead(tal_sim *sim, double dt) {
 
 // ---- the step -------------------------------------------------------------------------------------------------------
 
-// Where the boundary imposes something it has to know the forces of the contacts first.
-void tal_integrate_forces(tal_sim *sim) {
+// Forces of the contacts and what the boundary imposes, second half kick, ledger, eq (15). Where the boundary imposes
+// something it has to know the forces of the contacts first.
+static void sweep_drifted(tal_sim *sim) {
   const double credit = tal_integrate_credit(sim);
   if (!sim->boundary || !sim->boundary->constrain) {
     tal_forces_step(sim, sim->dt, credit, false);
@@ -101,7 +102,7 @@ void tal_integrate_verlet_step(tal_sim *sim) {
     tal_forces_step(sim, sim->dt, tal_integrate_credit(sim), true);
   } else {
     tal_integrate_drift(sim, sim->dt);
-    tal_integrate_forces(sim);
+    sweep_drifted(sim);
   }
   tal_integrate_end(sim);
 }
