@@ -42,11 +42,20 @@ void geo_pairs_clear(geo_pairs *pairs) {
   geo_pairs_init(pairs);
 }
 
+// Of numbers: fmin and fmax, which know what is none, are calls.
+static double least(double a, double b) {
+  return a < b ? a : b;
+}
+
+static double most(double a, double b) {
+  return a > b ? a : b;
+}
+
 // ---- grids ----
 
 static int64_t bucket_of(double x, double x0, double width) {
-  const double most = 0x1p62;
-  return (int64_t)fmax(-most, fmin(most, floor((x - x0) / width)));
+  const double last = 0x1p62, bucket = floor((x - x0) / width);
+  return (int64_t)most(-last, least(last, bucket));
 }
 
 static int compare_buckets(const void *a, const void *b) {
@@ -100,10 +109,10 @@ static void make_grid(grid *g, double reach) {
   g->x0 = x1;
   g->y0 = y1;
   for (size_t e = 1; e < g->count; e++) {
-    g->x0 = fmin(g->x0, g->entry[e].x);
-    g->y0 = fmin(g->y0, g->entry[e].y);
-    x1 = fmax(x1, g->entry[e].x);
-    y1 = fmax(y1, g->entry[e].y);
+    g->x0 = least(g->x0, g->entry[e].x);
+    g->y0 = least(g->y0, g->entry[e].y);
+    x1 = most(x1, g->entry[e].x);
+    y1 = most(y1, g->entry[e].y);
   }
   g->width = 2 * reach * (1 + 1e-6); // the rest covers rounding of bucket numbers
   double columns = floor((x1 - g->x0) / g->width) + 1, rows = floor((y1 - g->y0) / g->width) + 1;
@@ -216,33 +225,35 @@ static void sort_pairs(search *s, size_t n, geo_pairs *pairs) {
 }
 
 static double reach_of(double r, double margin) {
-  return fmax(0, r + 0.5 * margin);
+  return most(0, r + 0.5 * margin);
 }
 
-// 0 for reaches in (most / 2, most], one more per halving.
-static int class_of(double reach, double most) {
+// 0 for reaches in (largest / 2, largest], one more per halving.
+static int class_of(double reach, double largest) {
   int exponent;
+  if (reach > 0.5 * largest)
+    return 0;
   if (!(reach > 0))
     return CLASS_COUNT - 1;
-  double fraction = frexp(most / reach, &exponent);
+  double fraction = frexp(largest / reach, &exponent);
   int class = exponent - 1 + (fraction >= 1);
   return class < CLASS_COUNT ? class : CLASS_COUNT - 1;
 }
 
 // Copies the discs into their classes' grids.
 static void fill_grids(grid g[CLASS_COUNT], const double *x, const double *y, const double *r, size_t n, double margin,
-                       double most) {
+                       double largest) {
   double reach[CLASS_COUNT] = {0};
   for (size_t i = 0; i < n; i++)
-    g[class_of(reach_of(r[i], margin), most)].count++;
+    g[class_of(reach_of(r[i], margin), largest)].count++;
   for (int k = 0; k < CLASS_COUNT; k++) {
     g[k].entry = g[k].count ? geo_resize(NULL, g[k].count, sizeof *g[k].entry) : NULL;
     g[k].count = 0;
   }
   for (size_t i = 0; i < n; i++) {
     double own = reach_of(r[i], margin);
-    int k = class_of(own, most);
-    reach[k] = fmax(reach[k], own);
+    int k = class_of(own, largest);
+    reach[k] = most(reach[k], own);
     g[k].entry[g[k].count++] = (entry){.x = x[i], .y = y[i], .r = r[i], .id = (int32_t)i};
   }
   for (int k = 0; k < CLASS_COUNT; k++)
@@ -250,19 +261,19 @@ static void fill_grids(grid g[CLASS_COUNT], const double *x, const double *y, co
 }
 
 int geo_cells_pairs(const double *x, const double *y, const double *r, size_t n, double margin, geo_pairs *pairs) {
-  double most = 0;
+  double largest = 0;
   pairs->count = 0;
   if (!isfinite(margin))
     return -1;
   for (size_t i = 0; i < n; i++) {
     if (!isfinite(x[i]) || !isfinite(y[i]) || !isfinite(r[i]))
       return -1;
-    most = fmax(most, reach_of(r[i], margin));
+    largest = most(largest, reach_of(r[i], margin));
   }
-  if (!(most > 0))
+  if (!(largest > 0))
     return 0;
   grid g[CLASS_COUNT] = {0};
-  fill_grids(g, x, y, r, n, margin, most);
+  fill_grids(g, x, y, r, n, margin, largest);
   search s = {.margin = margin, .partners = geo_zeroed(n + 1, sizeof *s.partners)};
   for (int k = 0; k < CLASS_COUNT; k++) {
     search_own(&s, &g[k]);
