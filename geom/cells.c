@@ -42,6 +42,18 @@ void geo_pairs_clear(geo_pairs *pairs) {
   geo_pairs_init(pairs);
 }
 
+void geo_pairs_reserve(geo_pairs *pairs, size_t capacity) {
+  if (capacity <= pairs->capacity)
+    return;
+  pairs->pair = geo_resize(pairs->pair, capacity, sizeof *pairs->pair);
+  pairs->capacity = capacity;
+}
+
+void geo_pairs_fit(geo_pairs *pairs) {
+  pairs->pair = geo_resize(pairs->pair, pairs->count, sizeof *pairs->pair);
+  pairs->capacity = pairs->count;
+}
+
 // Of numbers: fmin and fmax, which know what is none, are calls.
 static double least(double a, double b) {
   return a < b ? a : b;
@@ -202,10 +214,7 @@ static void search_coarser(search *s, const grid *fine, const grid *coarse) {
 
 // Sorts by counting on the smaller id; a disc's few partners by insertion.
 static void sort_pairs(search *s, size_t n, geo_pairs *pairs) {
-  if (pairs->capacity < s->found.count) {
-    pairs->capacity = geo_capacity(pairs->capacity, s->found.count);
-    pairs->pair = geo_resize(pairs->pair, pairs->capacity, sizeof *pairs->pair);
-  }
+  geo_pairs_reserve(pairs, geo_capacity(pairs->capacity, s->found.count));
   pairs->count = s->found.count;
   size_t sum = 0;
   for (size_t i = 0; i <= n; i++) {

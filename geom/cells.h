@@ -12,6 +12,9 @@ typedef struct geo_pairs {
 
 void geo_pairs_init(geo_pairs *pairs);
 void geo_pairs_clear(geo_pairs *pairs);
+// Room for `capacity` pairs; and no more than there are.
+void geo_pairs_reserve(geo_pairs *pairs, size_t capacity);
+void geo_pairs_fit(geo_pairs *pairs);
 
 // All pairs i < j with |x_i - x_j| < r_i + r_j + margin [length] (compared as squares), sorted by (i, j). The margin
 // may be negative. Memory O(n) whatever the extent; sizes may differ by 100 and more without quadratic cost. Returns 0,

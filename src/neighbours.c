@@ -18,7 +18,7 @@ void tal_neighbours_init(tal_neighbours *neighbours) {
 }
 
 void tal_neighbours_clear(tal_neighbours *neighbours) {
-  geo_pairs_clear(&neighbours->pairs);
+  geo_pairs_clear(&neighbours->far);
   free(neighbours->first);
   free(neighbours->slot);
   free(neighbours->wall_first);
@@ -96,10 +96,55 @@ static void measure_ring(tal_sim *sim) {
     sim->neighbours.ring *= 2;
 }
 
-static void list_pairs(tal_sim *sim) {
+// Pairs that are looked through before the bucket grid is searched again: as far as is worth it, and no further than
+// a quarter of the smallest grain, so that there are few.
+static double far_reach(const tal_sim *sim) {
+  const double reach = fmin(0.15 * 2 * sim->constants.mean_radius, 0.25 * 2 * sim->constants.least_radius);
+  return reach > 3 * sim->constants.skin ? reach : sim->constants.skin;
+}
+
+static double sum_of_radii(const tal_grains *g) {
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (size_t i = 0; i < g->count; i++)
+    sum += g->r[i];
+  return sum;
+}
+
+static void search_far(tal_sim *sim) {
+  tal_neighbours *n = &sim->neighbours;
   const tal_grains *g = &sim->grains;
-  geo_pairs *pairs = &sim->neighbours.pairs;
-  geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, sim->constants.skin, pairs);
+  const double radii = sum_of_radii(g);
+  if (2 * n->far_moved * (1 + 1e-9) + sim->constants.skin <= n->reach && radii == n->far_radii)
+    return;
+  n->reach = far_reach(sim);
+  n->far_moved = 0;
+  n->far_radii = radii;
+  geo_pairs_clear(&n->far);
+  geo_cells_pairs(g->x_list, g->y_list, g->r, g->count, n->reach, &n->far);
+  geo_pairs_fit(&n->far);
+}
+
+// All pairs closer than contact plus the skin.
+static void search_pairs(tal_sim *sim, geo_pairs *pairs) {
+  const tal_grains *g = &sim->grains;
+  const geo_pairs *far = &sim->neighbours.far;
+  search_far(sim);
+  geo_pairs_reserve(pairs, far->count);
+  for (size_t c = 0; c < far->count; c++) {
+    const int32_t i = far->pair[c][0], j = far->pair[c][1];
+    const double dx = g->x_list[i] - g->x_list[j], dy = g->y_list[i] - g->y_list[j];
+    const double near = g->r[i] + g->r[j] + sim->constants.skin;
+    pairs->pair[pairs->count][0] = i;
+    pairs->pair[pairs->count][1] = j;
+    pairs->count += near > 0 && dx * dx + dy * dy < near * near;
+  }
+}
+
+static void list_pairs(tal_sim *sim) {
+  geo_pairs found, *pairs = &found;
+  geo_pairs_init(pairs);
+  search_pairs(sim, pairs);
   tal_contacts fresh;
   tal_contacts_init(&fresh);
   const tal_contact_needs needs = {.past = sim->effects & (TAL_EFFECT_SPRING | TAL_EFFECT_IMPLICIT),
@@ -219,8 +264,24 @@ static void list_all(tal_sim *sim) {
   n->rebuilds++;
 }
 
+// Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.
+static double largest_displacement(const tal_sim *sim) {
+  const tal_grains *g = &sim->grains;
+  double largest = 0;
+  bool finite = true;
+#pragma omp simd reduction(max : largest) reduction(&& : finite)
+  for (size_t i = 0; i < g->count; i++) {
+    double dx = g->x[i] - g->x_list[i], dy = g->y[i] - g->y_list[i];
+    double d2 = dx * dx + dy * dy;
+    largest = d2 > largest ? d2 : largest;
+    finite = finite && d2 <= 1e300;
+  }
+  return finite ? largest : (double)NAN;
+}
+
 void tal_neighbours_rebuild(tal_sim *sim) {
   tal_grains *g = &sim->grains;
+  sim->neighbours.far_moved += sqrt(largest_displacement(sim));
   memcpy(g->x_list, g->x, g->count * sizeof *g->x);
   memcpy(g->y_list, g->y, g->count * sizeof *g->y);
   for (size_t w = 0; w < sim->walls.count; w++) {
@@ -235,25 +296,11 @@ void tal_neighbours_rebuild(tal_sim *sim) {
 }
 
 void tal_neighbours_restore(tal_sim *sim) {
+  sim->neighbours.far_moved = (double)NAN;
   sim->neighbours.rebuilds = 0;       // the first list of this process: no wall comes or goes by it
   tal_implicit_clear(&sim->implicit); // lanes of a list before this one
   list_all(sim);
   sim->neighbours.moved = sim->constants.skin; // the next step has to look
-}
-
-// Largest displacement since the list was built, squared [m^2]; NAN when a coordinate is.
-static double largest_displacement(const tal_sim *sim) {
-  const tal_grains *g = &sim->grains;
-  double largest = 0;
-  bool finite = true;
-#pragma omp simd reduction(max : largest) reduction(&& : finite)
-  for (size_t i = 0; i < g->count; i++) {
-    double dx = g->x[i] - g->x_list[i], dy = g->y[i] - g->y_list[i];
-    double d2 = dx * dx + dy * dy;
-    largest = d2 > largest ? d2 : largest;
-    finite = finite && d2 <= 1e300;
-  }
-  return finite ? largest : (double)NAN;
 }
 
 static double largest_wall_displacement(const tal_sim *sim) {

@@ -8,7 +8,10 @@
 struct tal_sim;
 
 typedef struct tal_neighbours {
-  geo_pairs pairs;     // scratch of the bucket grid
+  geo_pairs far;       // owned; pairs of grains closer than contact plus `reach` when the bucket grid was searched
+  double reach;        // [m]
+  double far_moved;    // [m] no grain has moved further since then; NAN: they do not count
+  double far_radii;    // [m] sum of the radii then
   int32_t *first;      // owned; [n + 1] start of each grain's incidences; NULL where nobody looked
   int32_t *slot;       // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
   int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
