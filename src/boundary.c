@@ -1,5 +1,6 @@
 #include "boundary.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 static const tal_boundary *const boundaries[] = {&tal_boundary_pressure, &tal_boundary_membrane, &tal_boundary_minimal,
@@ -10,6 +11,21 @@ const tal_boundary *tal_boundary_find(const char *name) {
     if (!strcmp((*k)->name, name))
       return *k;
   return NULL;
+}
+
+void tal_boundary_prepare(tal_sim *sim) {
+  tal_grains *g = &sim->grains;
+  const size_t count = sim->graph.loop.count;
+  if (sim->boundary_moved) { // grains that left the loop keep their last force until the forces are evaluated anew
+    memset(g->bx, 0, g->count * sizeof *g->bx);
+    memset(g->by, 0, g->count * sizeof *g->by);
+    sim->boundary_moved = false;
+  }
+  if (sim->loop_capacity >= count)
+    return;
+  free(sim->loop_centre);
+  sim->loop_capacity = count + count / 8;
+  sim->loop_centre = tal_alloc(sim->loop_capacity, sizeof *sim->loop_centre);
 }
 
 size_t tal_boundary_choices(tal_choice *out, size_t capacity) {

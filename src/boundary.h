@@ -8,13 +8,15 @@
 struct tal_boundary {
   const char *name;
   const char *help;
-  bool plates;  // stands between plates
-  bool centres; // what it applies follows from the centres of the loop's grains
+  bool plates; // stands between plates
   // Sets itself up when a stage begins; NULL: nothing to do.
   tal_status (*begin)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
   void (*refreshed)(tal_sim *sim); // the graph is new: settle where on the loop to act
   void (*apply)(tal_sim *sim);     // forces bx, by for the present centres [N]
-  void (*start)(tal_sim *sim);     // velocities with which the stage begins; NULL: those there are
+  // The same for grains [from, to) alone and the centres in sim->loop_centre, where nothing else is asked for: threads
+  // press their own grains. NULL: it asks for more.
+  void (*press)(tal_sim *sim, size_t from, size_t to);
+  void (*start)(tal_sim *sim); // velocities with which the stage begins; NULL: those there are
   // Bodies of its own move with the grains: first and second half of a step, eqs (12)-(15). NULL: it has none.
   void (*drift)(tal_sim *sim, double dt);
   void (*finish)(tal_sim *sim, double dt, double credit);
@@ -34,6 +36,8 @@ struct tal_boundary {
 };
 
 const tal_boundary *tal_boundary_find(const char *name);
+// Before `press`: room for the centres of the loop, and no force on grains that have left it.
+void tal_boundary_prepare(tal_sim *sim);
 
 extern const tal_boundary tal_boundary_pressure, tal_boundary_membrane, tal_boundary_minimal;
 

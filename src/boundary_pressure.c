@@ -6,9 +6,6 @@
 // packing's uneven ends few grains touch: the arcs then end at the corners of the sample.
 #include "boundary.h"
 
-#include <stdlib.h>
-#include <string.h>
-
 // Loop places of the leftmost and rightmost grain at the plate; the grain nearest the plate when there is none.
 static void plate_ends(const tal_sim *sim, int plate, int64_t *left, int64_t *right) {
   const geo_loop *loop = &sim->graph.loop;
@@ -59,21 +56,30 @@ static void refreshed(tal_sim *sim) {
   plate_ends(sim, -1, &sim->run.arc_top_left, &sim->run.arc_top_right);
 }
 
+// The grains [from, to) whose forces are wanted.
+typedef struct own {
+  size_t from, to;
+} own;
+
+static void push(tal_sim *sim, own o, int32_t grain, double fx, double fy) {
+  if ((size_t)grain < o.from || (size_t)grain >= o.to)
+    return;
+  sim->grains.bx[grain] += fx;
+  sim->grains.by[grain] += fy;
+}
+
 // The given number of edges counter-clockwise from place `from`.
-static void press_arc(tal_sim *sim, int64_t from, size_t edges) {
+static void press_arc(tal_sim *sim, own o, int64_t from, size_t edges) {
   const geo_loop *loop = &sim->graph.loop;
-  tal_grains *g = &sim->grains;
+  const double(*at)[2] = (const double(*)[2])sim->loop_centre;
   const double half = 0.5 * sim->run.pressure * sim->constants.thickness;
   size_t k = (size_t)from;
   for (size_t e = 0; e < edges; e++) {
     size_t next = k + 1 == loop->count ? 0 : k + 1;
-    int32_t a = loop->node[k], b = loop->node[next];
     // inward normal times length of a counter-clockwise edge
-    double fx = -half * (g->y[b] - g->y[a]), fy = half * (g->x[b] - g->x[a]);
-    g->bx[a] += fx;
-    g->by[a] += fy;
-    g->bx[b] += fx;
-    g->by[b] += fy;
+    double fx = -half * (at[next][1] - at[k][1]), fy = half * (at[next][0] - at[k][0]);
+    push(sim, o, loop->node[k], fx, fy);
+    push(sim, o, loop->node[next], fx, fy);
     k = next;
   }
 }
@@ -84,40 +90,45 @@ static size_t edges_between(const geo_loop *loop, int64_t from, int64_t to) {
 
 // The horizontal part of the pressure on the straight line between two places, shared by the grains of the loop from
 // the one to the other.
-static void press_chord(tal_sim *sim, int64_t from, int64_t to) {
+static void press_chord(tal_sim *sim, own o, int64_t from, int64_t to) {
   const geo_loop *loop = &sim->graph.loop;
-  tal_grains *g = &sim->grains;
   const size_t grains = edges_between(loop, from, to) + 1;
-  const double rise = g->y[loop->node[to]] - g->y[loop->node[from]];
+  const double rise = sim->loop_centre[to][1] - sim->loop_centre[from][1];
   const double fx = -sim->run.pressure * sim->constants.thickness * rise / (double)grains;
   for (size_t k = 0; k < grains; k++)
-    g->bx[loop->node[((size_t)from + k) % loop->count]] += fx;
+    push(sim, o, loop->node[((size_t)from + k) % loop->count], fx, 0);
+}
+
+static void press(tal_sim *sim, size_t from, size_t to) {
+  const geo_loop *loop = &sim->graph.loop;
+  const tal_run *run = &sim->run;
+  const own o = {from, to};
+  for (size_t k = 0; k < loop->count; k++)
+    if ((size_t)loop->node[k] >= from && (size_t)loop->node[k] < to)
+      sim->grains.bx[loop->node[k]] = sim->grains.by[loop->node[k]] = 0;
+  if (!tal_walls_plate(&sim->walls, +1)) {
+    press_arc(sim, o, 0, loop->count);
+    return;
+  }
+  press_arc(sim, o, run->arc_bottom_right, edges_between(loop, run->arc_bottom_right, run->arc_top_right));
+  press_arc(sim, o, run->arc_top_left, edges_between(loop, run->arc_top_left, run->arc_bottom_left));
+  press_chord(sim, o, run->arc_bottom_left, run->arc_bottom_right);
+  press_chord(sim, o, run->arc_top_right, run->arc_top_left);
 }
 
 static void apply(tal_sim *sim) {
   const geo_loop *loop = &sim->graph.loop;
-  const tal_run *run = &sim->run;
-  tal_grains *g = &sim->grains;
-  if (sim->boundary_moved) { // grains that left the loop keep their last force until the forces are evaluated anew
-    memset(g->bx, 0, g->count * sizeof *g->bx);
-    memset(g->by, 0, g->count * sizeof *g->by);
-    sim->boundary_moved = false;
+  tal_boundary_prepare(sim);
+  for (size_t k = 0; k < loop->count; k++) {
+    sim->loop_centre[k][0] = sim->grains.x[loop->node[k]];
+    sim->loop_centre[k][1] = sim->grains.y[loop->node[k]];
   }
-  for (size_t k = 0; k < loop->count; k++)
-    g->bx[loop->node[k]] = g->by[loop->node[k]] = 0;
-  if (!tal_walls_plate(&sim->walls, +1)) {
-    press_arc(sim, 0, loop->count);
-    return;
-  }
-  press_arc(sim, run->arc_bottom_right, edges_between(loop, run->arc_bottom_right, run->arc_top_right));
-  press_arc(sim, run->arc_top_left, edges_between(loop, run->arc_top_left, run->arc_bottom_left));
-  press_chord(sim, run->arc_bottom_left, run->arc_bottom_right);
-  press_chord(sim, run->arc_top_right, run->arc_top_left);
+  press(sim, 0, sim->grains.count);
 }
 
 const tal_boundary tal_boundary_pressure = {.name = "pressure",
                                             .help = "pressure on the grains of the Delaunay boundary",
                                             .plates = true,
-                                            .centres = true,
                                             .refreshed = refreshed,
-                                            .apply = apply};
+                                            .apply = apply,
+                                            .press = press};

@@ -10,6 +10,7 @@
 // are taken before anyone moves a grain.
 #include "forces_range.h"
 
+#include "boundary.h"
 #include "drift.h"
 #include "forces.h"
 #include "kick.h"
@@ -74,6 +75,20 @@ static void foresee(const range *t, size_t start, size_t end, tal_grain_record *
       tal_drift_foresee(t->sim, start, count, t->sweep.dt, to + ((start - first) & mask));
     else
       tal_drift_records(t->sim, start, count, to + ((start - first) & mask));
+  }
+}
+
+// The centres that this thread's grains of the loop are going to have.
+static void foresee_loop(const range *t, size_t from) {
+  const tal_grains *g = &t->sim->grains;
+  const geo_loop *loop = &t->sim->graph.loop;
+  const double dt = t->sweep.dt, half = 0.5 * dt;
+  for (size_t k = 0; k < loop->count; k++) {
+    const size_t i = (size_t)loop->node[k];
+    if (i < from || i >= t->last)
+      continue;
+    t->sim->loop_centre[k][0] = g->x[i] + dt * (g->vx[i] + half * (g->fx[i] * g->inverse_mass[i]));
+    t->sim->loop_centre[k][1] = g->y[i] + dt * (g->vy[i] + half * (g->fy[i] * g->inverse_mass[i]));
   }
 }
 
@@ -255,9 +270,14 @@ int64_t tal_forces_range(tal_sim *sim, const tal_sweep *sweep, int part, int par
   t.sweep.moves = false;
   foresee(&t, t.done / GRAINS * GRAINS, first, t.record, 0, t.mask);
   foresee(&t, last, last + span, t.beyond, last, SIZE_MAX);
+  const tal_boundary *boundary = sweep->drifts ? sim->boundary : NULL;
+  if (boundary)
+    foresee_loop(&t, first);
   if (parts > 1) {
 #pragma omp barrier
   }
+  if (boundary)
+    boundary->press(sim, first, last);
   work_off(&t, first);
   if (parts > 1 && sweep->law & TAL_EFFECT_SPRING) { // the only history
 #pragma omp barrier

@@ -10,8 +10,6 @@
 #include "neighbours.h"
 #include "walls_load.h"
 
-#include <stdlib.h>
-
 enum { GRAINS = TAL_DRIFT_GRAINS, PARALLEL_FROM = 2000 };
 
 // Returns what no grain has moved further than [m].
@@ -37,40 +35,11 @@ void tal_integrate_drift(tal_sim *sim, double dt) {
     sim->boundary->apply(sim);
 }
 
-// ---- one pass over memory -------------------------------------------------------------------------------------------
-
 // A step may drift its grains while it works out the contacts when the list is known to hold and the boundary can do
 // with the centres of its grains. Takes the step into account in the list.
 static bool may_sweep_at_once(tal_sim *sim) {
-  return (!sim->boundary || sim->boundary->centres) && tal_neighbours_hold(sim, sim->next_stride);
+  return (!sim->boundary || sim->boundary->press) && tal_neighbours_hold(sim, sim->next_stride);
 }
-
-// Boundary forces for the centres that the loop's grains are going to have.
-static void apply_ahead(tal_sim *sim, double dt) {
-  const geo_loop *loop = &sim->graph.loop;
-  const tal_grains *g = &sim->grains;
-  const double half = 0.5 * dt;
-  double(*at)[2] = tal_alloc(loop->count, sizeof *at);
-  for (size_t k = 0; k < loop->count; k++) {
-    const int32_t i = loop->node[k];
-    at[k][0] = g->x[i];
-    at[k][1] = g->y[i];
-  }
-  for (size_t k = 0; k < loop->count; k++) { // from `at`: a loop may pass a grain twice
-    const int32_t i = loop->node[k];
-    g->x[i] = at[k][0] + dt * (g->vx[i] + half * (g->fx[i] * g->inverse_mass[i]));
-    g->y[i] = at[k][1] + dt * (g->vy[i] + half * (g->fy[i] * g->inverse_mass[i]));
-  }
-  sim->boundary->apply(sim);
-  for (size_t k = 0; k < loop->count; k++) {
-    const int32_t i = loop->node[k];
-    g->x[i] = at[k][0];
-    g->y[i] = at[k][1];
-  }
-  free(at);
-}
-
-// ---- the step -------------------------------------------------------------------------------------------------------
 
 // Forces of the contacts and what the boundary imposes, second half kick, ledger, eq (15). Where the boundary imposes
 // something it has to know the forces of the contacts first.
@@ -98,7 +67,7 @@ void tal_integrate_verlet_step(tal_sim *sim) {
     tal_walls_drift(sim);
   if (may_sweep_at_once(sim)) {
     if (sim->boundary)
-      apply_ahead(sim, sim->dt);
+      tal_boundary_prepare(sim);
     tal_forces_step(sim, sim->dt, tal_integrate_credit(sim), true);
   } else {
     tal_integrate_drift(sim, sim->dt);

@@ -187,6 +187,7 @@ void tal_sim_free(tal_sim *sim) {
   free(sim->force_records);
   free(sim->sums);
   free(sim->rings);
+  free(sim->loop_centre);
   free(sim->powers);
   tal_graph_clear(&sim->graph);
   free(sim);

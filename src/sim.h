@@ -188,11 +188,13 @@ struct tal_sim {
   const tal_stage *stage;       // descriptor of the current stage, NULL when all are done
   const tal_boundary *boundary; // what presses the loop now, NULL: nothing
   bool boundary_moved;          // the boundary acts on other grains than at the last evaluation
-  double friction;              // [-] of grain-grain contacts now (a stage may change it)
-  double dt;                    // [s] of the step being taken; between two steps: of the coming one
-  double dt_next;               // [s] of the step after the one being taken
-  double next_stride;           // [m] no grain will move further than this in the coming step; NAN: not known
-  unsigned effects;             // mask of effects.h that the hot loop pays for
+  double (*loop_centre)[2];     // owned; [loop_capacity] centres of the loop's grains that a boundary presses at [m]
+  size_t loop_capacity;
+  double friction;    // [-] of grain-grain contacts now (a stage may change it)
+  double dt;          // [s] of the step being taken; between two steps: of the coming one
+  double dt_next;     // [s] of the step after the one being taken
+  double next_stride; // [m] no grain will move further than this in the coming step; NAN: not known
+  unsigned effects;   // mask of effects.h that the hot loop pays for
   double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
 };
 

@@ -81,7 +81,7 @@ static void drift(tal_sim *sim) {
   tal_integrate_drift(sim, 0);
 }
 static void forces(tal_sim *sim) {
-  tal_forces_step(sim, 0, 0, !(sim->boundary && !sim->boundary->centres));
+  tal_forces_step(sim, 0, 0, !sim->boundary || sim->boundary->press);
 }
 static void rebuild(tal_sim *sim) {
   tal_neighbours_rebuild(sim);
