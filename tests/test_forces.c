@@ -159,7 +159,7 @@ static void one_pass_or_two(void **state) {
   (void)state;
   static const char *const laws[] = {"{tangential: regularised}", "{tangential: spring}", "{tangential: none}"};
   for (size_t k = 0; k < sizeof laws / sizeof *laws; k++)
-    for (int threads = 1; threads <= 2; threads++) {
+    for (int threads = 1; threads <= 3; threads++) {
       engine *e[2];
       int at_once = 0;
       for (int m = 0; m < 2; m++) {

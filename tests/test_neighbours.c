@@ -217,6 +217,48 @@ static void plates_and_pressure(void **state) {
   run_all(biaxial, 6000, 3000, 1000);
 }
 
+// EXACT: what is listed against all pairs, grains moved between lists by a little each time, once by much, once
+// swollen.
+static void lists_from_a_farther_one(void **state) {
+  (void)state;
+  enum { COUNT = 600, LISTS = 60 };
+  gsl_rng *random = gsl_rng_alloc(gsl_rng_mt19937);
+  draft *d = draft_begin();
+  fputs("grains:\n  thickness: 1\n  list:\n", d->to);
+  for (int k = 0; k < COUNT; k++)
+    fprintf(d->to, "  - {x: %d, y: %d, r: %.17g}\n", 2 * (k % 25), 2 * (k / 25), 0.7 + 0.35 * gsl_rng_uniform(random));
+  fputs("material: {young: 1e5, density: 1, friction: 0.5}\nlimits: {overlap: 1}\nintegrator: {dt: 1e-4}\n"
+        "contact: {tangential: none}\nstages: [{kind: free, duration: 1}]\n",
+        d->to);
+  engine *e = engine_start(d);
+  tal_grains *g = &e->sim->grains;
+  size_t searches = 0, listed = 0;
+  for (int m = 0; m < LISTS; m++) {
+    const double step = m == 40 ? 3 : 0.02;
+    for (size_t i = 0; i < g->count; i++) {
+      g->x[i] += step * (gsl_rng_uniform(random) - 0.5);
+      g->y[i] += step * (gsl_rng_uniform(random) - 0.5);
+      g->r[i] *= m == 20 ? 1.2 : 1;
+    }
+    tal_neighbours_rebuild(e->sim);
+    searches += e->sim->neighbours.far_moved == 0;
+    size_t c = 0;
+    for (int32_t i = 0; i < COUNT; i++)
+      for (int32_t j = i + 1; j < COUNT; j++) {
+        const double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j], near = g->r[i] + g->r[j] + e->sim->constants.skin;
+        if (!(dx * dx + dy * dy < near * near))
+          continue;
+        assert_true(c < e->sim->pairs.count && e->sim->pairs.i[c] == i && e->sim->pairs.j[c] == j);
+        c++;
+      }
+    assert_int_equal(c, e->sim->pairs.count);
+    listed += c;
+  }
+  assert_true(searches > 5 && searches < LISTS / 2 && listed > LISTS * COUNT / 4);
+  engine_end(e);
+  gsl_rng_free(random);
+}
+
 int main(void) {
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {
@@ -224,6 +266,7 @@ int main(void) {
       cmocka_unit_test(size_ratio_20),
       cmocka_unit_test(walls_that_move_come_and_go),
       cmocka_unit_test(plates_and_pressure),
+      cmocka_unit_test(lists_from_a_farther_one),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
