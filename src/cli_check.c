@@ -191,7 +191,9 @@ static void print_penalties(tal_sim *sim) {
 }
 
 static bool same_cost(const tal_scene_integrator *a, const tal_scene_integrator *b) {
-  return strcmp(a->scheme, b->scheme) == 0 && a->m == b->m && a->n == b->n && a->q == b->q && a->sweeps == b->sweeps;
+  const bool tolerance = a->tolerance == b->tolerance || (isnan(a->tolerance) && isnan(b->tolerance));
+  return strcmp(a->scheme, b->scheme) == 0 && a->m == b->m && a->n == b->n && a->q == b->q && a->sweeps == b->sweeps &&
+         tolerance;
 }
 
 // The same for another integrator than the first stage's, tried there; the first's where that cannot be.

@@ -105,7 +105,7 @@ void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, t
   tal_grains copy = sim->grains;
   double **const field[MOVED] = {&copy.x,     &copy.y,  &copy.theta, &copy.vx,  &copy.vy,
                                  &copy.omega, &copy.ux, &copy.uy,    &copy.spin};
-  double moved[MOVED][GRAINS];
+  double moved[MOVED][GRAINS] __attribute__((aligned(64)));
   for (int m = 0; m < MOVED; m++) {
     memcpy(moved[m], *field[m] + start, (size_t)count * sizeof(double));
     *field[m] = moved[m];

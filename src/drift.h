@@ -16,7 +16,8 @@ static inline double tal_drift_stride(double dt, int64_t fastest) {
   return (1 + 1e-9) * dt * sqrt(tal_double((uint64_t)fastest));
 }
 
-// Records of drifted grains that no kick has touched yet: record[0] is that of grain `start`.
+// Records of drifted grains, record[0] that of grain `start`. hx, hy are the velocities as they stand: those of the
+// middle of the step until the kick, later of no use but to an observer, who moves no spring.
 void tal_drift_records(const tal_sim *sim, size_t start, int count, tal_grain_record *record);
 // The same of grains that have not drifted yet and stay where they are.
 void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record);

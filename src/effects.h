@@ -1,5 +1,6 @@
 // The effects a run pays for, as a bit mask. A bit is set only when the scene calls for the effect; kernels take the
-// mask as a constant where a variant is listed (forces.c) and as a run-time value otherwise, with the same bits.
+// mask as a constant where a variant is listed (contact_block.c, kick.c) and as a run-time value otherwise, with the
+// same bits.
 #ifndef TAL_EFFECTS_H
 #define TAL_EFFECTS_H
 

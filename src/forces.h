@@ -1,6 +1,6 @@
 // Contact forces. A step sums the forces of the slots grain by grain and kicks each grain as soon as its contacts are
-// done (forces.c); observers and friction solved implicitly want the force of every slot kept (forces_kept.c). Every
-// grain sums its slots in the order of its partners, so any number of threads gives the same bits.
+// done (forces_range.c); observers and friction solved implicitly want the force of every slot kept (forces_kept.c).
+// Every grain sums its slots in the order of its partners, so any number of threads gives the same bits.
 #ifndef TAL_FORCES_H
 #define TAL_FORCES_H
 

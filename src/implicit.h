@@ -81,6 +81,7 @@ typedef struct tal_implicit {
   size_t *wall_lane; // owned; [wall_lanes] lanes of the wall slots
   size_t wall_lanes;
   bool all_free; // no grain is fixed and no spin held
+  bool springs;  // the lanes were made for the spring law: kept_spring is what the last step left, else ft
   size_t tiles, tile_grains;
   tal_implicit_tile *tile; // owned; [tiles]
   size_t *first;           // owned; [colours + 1] first lane of each colour of each tile

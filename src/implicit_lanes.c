@@ -241,6 +241,7 @@ void tal_implicit_list(tal_sim *sim) {
   for (size_t g = 0; g < grains; g++)
     s->all_free = s->all_free && sim->grains.inverse_mass[g] > 0 &&
                   (sim->grains.inverse_inertia[g] > 0 || !(sim->effects & TAL_EFFECT_SPIN));
+  s->springs = sim->effects & TAL_EFFECT_SPRING;
   s->listed = sim->neighbours.rebuilds;
 }
 
@@ -253,7 +254,7 @@ void tal_implicit_take_friction(tal_sim *sim) {
 void tal_implicit_save(tal_sim *sim) {
   const tal_implicit *s = &sim->implicit;
   const tal_implicit_lanes *m = &s->lane;
-  const double *spring = sim->effects & TAL_EFFECT_SPRING ? m->kept_spring : m->ft;
+  const double *spring = s->springs ? m->kept_spring : m->ft;
   if (s->listed != sim->neighbours.rebuilds)
     return;
   for (size_t lane = 0; lane < s->lanes; lane++) {

@@ -1,6 +1,6 @@
 // The order of grains in memory. Neighbours in space shall be neighbours in memory: the hot loop holds the grains
-// between the two ends of a contact in the cache, and threads take ranges of grains (forces.c). Large samples are laid
-// in layers across their shorter side, once, when they are made. Who writes for users gives grains in the order of
+// between the two ends of a contact in the cache, and threads take ranges of grains (forces_range.c). Large samples are
+// laid in layers across their shorter side, once, when they are made. Who writes for users gives grains in the order of
 // their ids.
 #ifndef TAL_ORDER_H
 #define TAL_ORDER_H

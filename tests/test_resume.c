@@ -290,36 +290,63 @@ static bool tried(const engine *e) {
   return edge || run->step % 61 == 0;
 }
 
+static void restore_at_any_step(const char *text, int stage_count, int least_points) {
+  char path[TAL_PATH_SIZE];
+  place p = place_create(text);
+  tal_file_path(path, p.folder, "checkpoint.h5");
+  draft *d = draft_begin();
+  fputs(text, d->to);
+  engine *e = engine_start(d);
+  int64_t seen = 0;
+  int points = 0;
+  for (; !tal_sim_done(e->sim); points++) {
+    engine *f = restored(e, text, path);
+    do {
+      engine_step(e);
+      engine_step(f);
+      assert_same_run(e, f);
+    } while (!tried(e));
+    assert_same_rows(e, f);
+    seen |= 1 << e->sim->run.stage;
+    engine_end(f);
+  }
+  assert_int_equal(seen, (1 << stage_count) - 1);
+  assert_true(points > least_points);
+  engine_end(e);
+  place_remove(&p);
+}
+
 // EXACT: written, read into a fresh simulation and carried on, from any step: the same motion, accounts and rows.
 static void restored_at_any_step(void **state) {
   (void)state;
   static const char *const laws[] = {"regularised", "spring"};
   static const char *const refresh[] = {"50", "{displacement: 0.002}"};
   for (int law = 0; law < 2; law++) {
-    char text[2000], path[TAL_PATH_SIZE];
+    char text[2000];
     snprintf(text, sizeof text, stages, laws[law], refresh[law]);
-    place p = place_create(text);
-    tal_file_path(path, p.folder, "checkpoint.h5");
-    draft *d = draft_begin();
-    fputs(text, d->to);
-    engine *e = engine_start(d);
-    int64_t seen = 0;
-    int points = 0;
-    for (; !tal_sim_done(e->sim); points++) {
-      engine *f = restored(e, text, path);
-      do {
-        engine_step(e);
-        engine_step(f);
-        assert_same_run(e, f);
-      } while (!tried(e));
-      assert_same_rows(e, f);
-      seen |= 1 << e->sim->run.stage;
-      engine_end(f);
-    }
-    assert_int_equal(seen, 31); // all five stages
-    assert_true(points > 40);
-    engine_end(e);
-    place_remove(&p);
+    restore_at_any_step(text, 5, 40);
+  }
+}
+
+// Friction that ends with a stage and comes back with the next, solved implicitly; nothing moves far in between.
+static const char off_and_on[] =
+    "grains: {count: 50, radius: {law: uniform, min: 0.4e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+    "material: {young: 30e9, poisson: 0.3, density: 2675, friction: 0.45, damping: 0.002}\nmass_scaling: 1e5\n"
+    "contact: {tangential: %s}\npack: {method: drop_and_roll, width: 9e-3}\ncontinuum: {refresh: 50}\n"
+    "neighbours: {skin: 0.5}\nintegrator: {scheme: implicit_friction, dt: 1e-5}\n"
+    "stages:\n  - {kind: confine, pressure: 100e3, ramp: 0.02, tolerance: 0.8, unbalanced: 100}\n"
+    "  - {kind: compress, rate: 0.5, strain: 0.004}\n"
+    "  - {kind: confine, pressure: 100e3, ramp: 0.001, friction: 0, tolerance: 0.9, unbalanced: 100}\n"
+    "  - {kind: compress, rate: 0.5, strain: 0.006}\n";
+
+// EXACT.
+static void friction_that_comes_back(void **state) {
+  (void)state;
+  static const char *const laws[] = {"regularised", "spring"};
+  for (int law = 0; law < 2; law++) {
+    char text[2000];
+    snprintf(text, sizeof text, off_and_on, laws[law]);
+    restore_at_any_step(text, 4, 10);
   }
 }
 
@@ -330,7 +357,7 @@ int main(int argc, char **argv) {
   const struct CMUnitTest tests[] = {
       cmocka_unit_test(interrupted_and_resumed), cmocka_unit_test(schemes_in_turn),
       cmocka_unit_test(other_number_of_threads), cmocka_unit_test(killed_and_resumed),
-      cmocka_unit_test(restored_at_any_step),
+      cmocka_unit_test(restored_at_any_step),    cmocka_unit_test(friction_that_comes_back),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
