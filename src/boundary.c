@@ -13,14 +13,18 @@ const tal_boundary *tal_boundary_find(const char *name) {
   return NULL;
 }
 
-void tal_boundary_prepare(tal_sim *sim) {
+void tal_boundary_let_go(tal_sim *sim) {
   tal_grains *g = &sim->grains;
+  if (!sim->boundary_moved)
+    return;
+  memset(g->bx, 0, g->count * sizeof *g->bx);
+  memset(g->by, 0, g->count * sizeof *g->by);
+  sim->boundary_moved = false;
+}
+
+void tal_boundary_prepare(tal_sim *sim) {
   const size_t count = sim->graph.loop.count;
-  if (sim->boundary_moved) { // grains that left the loop keep their last force until the forces are evaluated anew
-    memset(g->bx, 0, g->count * sizeof *g->bx);
-    memset(g->by, 0, g->count * sizeof *g->by);
-    sim->boundary_moved = false;
-  }
+  tal_boundary_let_go(sim);
   if (sim->loop_capacity >= count)
     return;
   free(sim->loop_centre);

@@ -36,6 +36,9 @@ struct tal_boundary {
 };
 
 const tal_boundary *tal_boundary_find(const char *name);
+// Where the boundary has come to act on other grains: no force on those of before, which keep their last one until the
+// forces are evaluated anew.
+void tal_boundary_let_go(tal_sim *sim);
 // Before `press`: room for the centres of the loop, and no force on grains that have left it.
 void tal_boundary_prepare(tal_sim *sim);
 

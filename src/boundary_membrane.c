@@ -14,11 +14,7 @@ static void refreshed(tal_sim *sim) {
 static void apply(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   const tal_membrane *m = &sim->membrane;
-  if (sim->boundary_moved) {
-    memset(g->bx, 0, g->count * sizeof *g->bx);
-    memset(g->by, 0, g->count * sizeof *g->by);
-    sim->boundary_moved = false;
-  }
+  tal_boundary_let_go(sim);
   for (size_t c = 0; c < m->contact_count; c++)
     g->bx[m->contact[c].grain] = g->by[m->contact[c].grain] = 0;
   tal_membrane_forces(sim);

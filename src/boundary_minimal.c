@@ -167,11 +167,7 @@ static void apply(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   tal_rows *rows = &sim->rows;
   tal_boundary_target t = target_of(sim);
-  if (sim->boundary_moved) { // what left the loop is let go
-    memset(g->bx, 0, g->count * sizeof *g->bx);
-    memset(g->by, 0, g->count * sizeof *g->by);
-    sim->boundary_moved = false;
-  }
+  tal_boundary_let_go(sim);
   if (!rows->nodes)
     return;
   tal_rows_move(rows, &sim->graph.loop, g->x, g->y);

@@ -213,20 +213,24 @@ static double rate_with(const tal_scene *scene, const tal_scene_integrator *inte
 }
 
 static void print_cost(tal_sim *sim, tal_scene *scene) {
-  double steps = 0, seconds = 0, grains = (double)sim->grains.count, first = 0;
+  double steps = 0, seconds = 0, grains = (double)sim->grains.count;
   printf("memory        %.3g MB for grains, contacts and graph\n", 1e-6 * memory(sim));
+  if (scene->stage_count == 0)
+    return;
+  tal_run_threads(sim->grains.count, 0);
+  double *rate = tal_alloc(scene->stage_count, sizeof *rate); // steps per second of each stage
+  const double first = measured_rate(sim);
   for (size_t s = 0; s < scene->stage_count; s++) {
     const tal_scene_stage *stage = &scene->stages[s];
     const double planned = planned_steps(stage);
-    if (planned > 0 && first == 0) {
-      tal_run_threads(sim->grains.count, 0);
-      first = measured_rate(sim);
-    }
-    const bool as_first = same_cost(&stage->integrator, &scene->stages[0].integrator);
-    if (planned > 0)
-      seconds += planned / (as_first ? first : rate_with(scene, &stage->integrator, first));
+    size_t like = 0; // the first stage of this cost
+    while (!same_cost(&stage->integrator, &scene->stages[like].integrator))
+      like++;
+    rate[s] = s == 0 ? first : like < s ? rate[like] : rate_with(scene, &stage->integrator, first);
+    seconds += planned > 0 ? planned / rate[s] : 0;
     steps += planned;
   }
+  free(rate);
   if (steps == 0)
     return;
   printf("time          %.3g steps, %.3g million grain-steps/s in a trial: about %.3g s\n", steps,
