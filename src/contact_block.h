@@ -15,6 +15,11 @@ typedef struct tal_force_block {
   double force[8][TAL_BLOCK];
 } __attribute__((aligned(64))) tal_force_block;
 
+// A force record as two vectors.
+typedef struct tal_force_halves {
+  tal_lanes first, second;
+} tal_force_halves;
+
 // What one sweep over the slots has in common.
 typedef struct tal_sweep {
   double dt;    // [s] moves the tangential springs; 0: none

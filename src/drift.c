@@ -1,103 +1,134 @@
-// A vector loop over a handful of grains; their records are turned four at a time.
+// Four grains at a time; what the laws see of them is turned into records while it is at hand. Arrays of grains are
+// whole cache lines, zeros beyond the last grain, which stay zeros.
 #include "drift.h"
 
 #include "effects.h"
 #include "lanes.h"
-#include "root.h"
 
 #include <string.h>
 
 enum { GRAINS = TAL_DRIFT_GRAINS };
 
-TAL_KERNEL int64_t drift(const tal_grains *g, size_t start, int count, double dt, unsigned effects) {
-  const double *restrict fx = g->fx + start, *restrict fy = g->fy + start, *restrict torque = g->torque + start;
-  const double *restrict inverse_mass = g->inverse_mass + start, *restrict inverse_inertia = g->inverse_inertia + start;
-  double *restrict x = g->x + start, *restrict y = g->y + start, *restrict theta = g->theta + start;
-  double *restrict vx = g->vx + start, *restrict vy = g->vy + start, *restrict omega = g->omega + start;
-  double *restrict ux = g->ux + start, *restrict uy = g->uy + start, *restrict spin = g->spin + start;
-  const double half = 0.5 * dt;
-  int64_t fastest = 0;
-#pragma omp simd reduction(max : fastest)
-  for (int k = 0; k < count; k++) {
-    double kick_x = half * (fx[k] * inverse_mass[k]), kick_y = half * (fy[k] * inverse_mass[k]);
-    double u = vx[k] + kick_x, v = vy[k] + kick_y;
-    if (effects & TAL_EFFECT_SPIN) {
-      double turn = half * (torque[k] * inverse_inertia[k]);
-      double turned = omega[k] + turn;
-      theta[k] += dt * turned;
-      omega[k] = turned;
-      spin[k] = effects & TAL_EFFECT_SPRING ? turned : turned + turn;
-    }
-    x[k] += dt * u;
-    y[k] += dt * v;
-    vx[k] = u;
-    vy[k] = v;
-    ux[k] = u + kick_x;
-    uy[k] = v + kick_y;
-    int64_t speed = tal_speed_bits(u, v);
-    fastest = speed > fastest ? speed : fastest;
-  }
-  return fastest;
-}
+// A record of each of four grains, as lanes.
+typedef struct four {
+  union {
+    struct {
+      tal_lanes x, y, ux, uy;
+    };
+    tal_lanes first[4];
+  };
+  union {
+    struct {
+      tal_lanes hx, hy, spin, r_spin; // zero where the effects leave them out
+    };
+    tal_lanes second[4];
+  };
+} four;
 
-static int64_t drift_any(const tal_grains *g, unsigned effects, size_t start, int count, double dt) {
-  if (!(effects & TAL_EFFECT_SPIN))
-    return drift(g, start, count, dt, 0);
-  if (!(effects & TAL_EFFECT_SPRING))
-    return drift(g, start, count, dt, TAL_EFFECT_SPIN);
-  return drift(g, start, count, dt, TAL_EFFECT_SPIN | TAL_EFFECT_SPRING);
-}
-
-int64_t tal_drift_group(tal_sim *sim, size_t start, int count, double dt) {
-  return drift_any(&sim->grains, sim->effects, start, count, dt);
-}
-
-static tal_grain_record record_of(const tal_grains *g, size_t i, unsigned effects) {
-  const double spin = effects & TAL_EFFECT_SPIN ? g->spin[i] : 0;
-  return (tal_grain_record){g->x[i], g->y[i], g->ux[i], g->uy[i], g->vx[i], g->vy[i], spin, g->r[i] * spin};
-}
-
-// Members of the records of grains i ... i + 3.
-TAL_KERNEL void write_four(const tal_grains *g, size_t i, tal_grain_record *record, unsigned effects) {
-  const double *field[6] = {g->x, g->y, g->ux, g->uy, g->vx, g->vy};
-  tal_lanes first[4], second[4] = {{0}, {0}, {0}, {0}};
-  for (int m = 0; m < 4; m++)
-    first[m] = *(const tal_lanes *)&field[m][i];
-  for (int m = 0; m < 2 && effects & TAL_EFFECT_SPRING; m++) // nobody else asks for the middle of the step
-    second[m] = *(const tal_lanes *)&field[4 + m][i];
-  if (effects & TAL_EFFECT_SPIN) {
-    second[2] = *(const tal_lanes *)&g->spin[i];
-    second[3] = second[2] * *(const tal_lanes *)&g->r[i];
-  }
-  tal_lanes_turn(first);
-  tal_lanes_turn(second);
+TAL_KERNEL void write_four(four *f, tal_grain_record *record) {
+  tal_lanes_turn(f->first);
+  tal_lanes_turn(f->second);
   for (int m = 0; m < 4; m++) {
-    *(tal_lanes *)&record[m].x = first[m];
-    *(tal_lanes *)&record[m].hx = second[m];
+    *(tal_lanes *)&record[m].x = f->first[m];
+    *(tal_lanes *)&record[m].hx = f->second[m];
   }
 }
 
-static void write_records(const tal_grains *g, unsigned effects, size_t start, int count, tal_grain_record *record) {
-  const int whole = count & ~3;
-  const unsigned both = TAL_EFFECT_SPIN | TAL_EFFECT_SPRING;
-  if ((effects & both) == both)
-    for (int k = 0; k < whole; k += 4)
-      write_four(g, start + (size_t)k, record + k, both);
-  else if (effects & TAL_EFFECT_SPRING)
-    for (int k = 0; k < whole; k += 4)
-      write_four(g, start + (size_t)k, record + k, TAL_EFFECT_SPRING);
-  else if (effects & TAL_EFFECT_SPIN)
-    for (int k = 0; k < whole; k += 4)
-      write_four(g, start + (size_t)k, record + k, TAL_EFFECT_SPIN);
-  else
-    for (int k = 0; k < whole; k += 4)
-      write_four(g, start + (size_t)k, record + k, 0);
-  for (int k = whole; k < count; k++)
-    record[k] = record_of(g, start + (size_t)k, effects);
+// Spin and angle; the spin that the laws see.
+TAL_KERNEL void turn_four(const tal_grains *g, size_t i, double dt, four *f, unsigned effects) {
+  const tal_lanes turn = 0.5 * dt * (TAL_LANES_AT(g->torque, i) * TAL_LANES_AT(g->inverse_inertia, i));
+  const tal_lanes turned = TAL_LANES_AT(g->omega, i) + turn;
+  TAL_LANES_AT(g->theta, i) += dt * turned;
+  TAL_LANES_AT(g->omega, i) = turned;
+  f->spin = turned;
+  if (!(effects & TAL_EFFECT_SPRING))
+    f->spin += turn;
+  TAL_LANES_AT(g->spin, i) = f->spin;
+  f->r_spin = f->spin * TAL_LANES_AT(g->r, i);
+}
+
+TAL_KERNEL void drift_four(const tal_grains *g, size_t i, double dt, four *f, tal_lanes_bits *fastest,
+                           unsigned effects) {
+  const tal_lanes inverse_mass = TAL_LANES_AT(g->inverse_mass, i);
+  const tal_lanes kick_x = 0.5 * dt * (TAL_LANES_AT(g->fx, i) * inverse_mass);
+  const tal_lanes kick_y = 0.5 * dt * (TAL_LANES_AT(g->fy, i) * inverse_mass);
+  const tal_lanes u = TAL_LANES_AT(g->vx, i) + kick_x, v = TAL_LANES_AT(g->vy, i) + kick_y;
+  *f = (four){
+      .x = TAL_LANES_AT(g->x, i) + dt * u, .y = TAL_LANES_AT(g->y, i) + dt * v, .ux = u + kick_x, .uy = v + kick_y};
+  if (effects & TAL_EFFECT_SPIN)
+    turn_four(g, i, dt, f, effects);
+  if (effects & TAL_EFFECT_SPRING) { // nobody else asks for the middle of the step
+    f->hx = u;
+    f->hy = v;
+  }
+  TAL_LANES_AT(g->x, i) = f->x;
+  TAL_LANES_AT(g->y, i) = f->y;
+  TAL_LANES_AT(g->vx, i) = u;
+  TAL_LANES_AT(g->vy, i) = v;
+  TAL_LANES_AT(g->ux, i) = f->ux;
+  TAL_LANES_AT(g->uy, i) = f->uy;
+  tal_lanes_fastest(&u, &v, fastest);
+}
+
+TAL_KERNEL int64_t drift(const tal_grains *g, size_t start, int count, double dt, tal_grain_record *record,
+                         unsigned effects) {
+  tal_lanes_bits fastest = {0};
+  for (int k = 0; k < count; k += 4) {
+    four f;
+    drift_four(g, start + (size_t)k, dt, &f, &fastest, effects);
+    if (record)
+      write_four(&f, record + k);
+  }
+  return tal_lanes_largest(&fastest);
+}
+
+TAL_KERNEL void write_records(const tal_grains *g, size_t start, int count, tal_grain_record *record,
+                              unsigned effects) {
+  for (int k = 0; k < count; k += 4) {
+    const size_t i = start + (size_t)k;
+    four f = {.x = TAL_LANES_AT(g->x, i),
+              .y = TAL_LANES_AT(g->y, i),
+              .ux = TAL_LANES_AT(g->ux, i),
+              .uy = TAL_LANES_AT(g->uy, i)};
+    if (effects & TAL_EFFECT_SPRING) {
+      f.hx = TAL_LANES_AT(g->vx, i);
+      f.hy = TAL_LANES_AT(g->vy, i);
+    }
+    if (effects & TAL_EFFECT_SPIN) {
+      f.spin = TAL_LANES_AT(g->spin, i);
+      f.r_spin = f.spin * TAL_LANES_AT(g->r, i);
+    }
+    write_four(&f, record + k);
+  }
+}
+
+#define EVERY_VARIANT ONE(0) ONE(TAL_EFFECT_SPIN) ONE(TAL_EFFECT_SPRING) ONE(TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)
+
+static int64_t drift_any(const tal_grains *g, unsigned effects, size_t start, int count, double dt,
+                         tal_grain_record *record) {
+  switch (effects & (TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)) {
+#define ONE(mask)                                                                                                      \
+  case (mask):                                                                                                         \
+    return drift(g, start, count, dt, record, (mask));
+    EVERY_VARIANT
+#undef ONE
+  }
+  return 0;
+}
+
+int64_t tal_drift_group(tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record) {
+  return drift_any(&sim->grains, sim->effects, start, count, dt, record);
 }
 
 void tal_drift_records(const tal_sim *sim, size_t start, int count, tal_grain_record *record) {
-  write_records(&sim->grains, sim->effects, start, count, record);
+  switch (sim->effects & (TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)) {
+#define ONE(mask)                                                                                                      \
+  case (mask):                                                                                                         \
+    write_records(&sim->grains, start, count, record, (mask));                                                         \
+    break;
+    EVERY_VARIANT
+#undef ONE
+  }
 }
 
 void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record) {
@@ -105,7 +136,7 @@ void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, t
   tal_grains copy = sim->grains;
   double **const field[MOVED] = {&copy.x,     &copy.y,  &copy.theta, &copy.vx,  &copy.vy,
                                  &copy.omega, &copy.ux, &copy.uy,    &copy.spin};
-  double moved[MOVED][GRAINS] __attribute__((aligned(64)));
+  double moved[MOVED][GRAINS] __attribute__((aligned(64))) = {{0}};
   for (int m = 0; m < MOVED; m++) {
     memcpy(moved[m], *field[m] + start, (size_t)count * sizeof(double));
     *field[m] = moved[m];
@@ -116,6 +147,5 @@ void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, t
   copy.inverse_mass += start;
   copy.inverse_inertia += start;
   copy.r += start;
-  drift_any(&copy, sim->effects, 0, count, dt);
-  write_records(&copy, sim->effects, 0, count, record);
+  drift_any(&copy, sim->effects, 0, count, dt, record);
 }

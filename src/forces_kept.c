@@ -52,7 +52,7 @@ void tal_forces_forget(tal_sim *sim) {
 static void see_grains(tal_sim *sim) {
   const size_t count = sim->grains.count;
   if (!sim->grain_records)
-    sim->grain_records = tal_alloc(count, sizeof *sim->grain_records);
+    sim->grain_records = tal_alloc((count + 3) / 4 * 4, sizeof *sim->grain_records);
 #pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
   for (size_t start = 0; start < count; start += GRAINS)
     tal_drift_records(sim, start, (int)(count - start < GRAINS ? count - start : GRAINS), sim->grain_records + start);
@@ -165,16 +165,12 @@ void tal_forces_expand(tal_sim *sim) {
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
 
-typedef struct halves {
-  tal_lanes first, second; // of a force record
-} halves;
-
 // Sum over the grain-grain slots of one grain.
 static tal_force_record sum_pairs(const tal_sim *sim, size_t grain) {
   const tal_lanes torque = {-1, -1, 1, 1}; // on the slot's j the vectors change sign, the torque does not
   const int32_t *slot = sim->neighbours.slot;
-  const halves *record = (const halves *)sim->force_records;
-  halves sum = {{0}, {0}};
+  const tal_force_halves *record = (const tal_force_halves *)sim->force_records;
+  tal_force_halves sum = {{0}, {0}};
   for (int32_t k = sim->neighbours.first[grain]; k < sim->neighbours.first[grain + 1]; k++) {
     if (slot[k] >= 0) {
       sum.first += record[slot[k]].first;
@@ -235,14 +231,10 @@ void tal_forces_finish_step(tal_sim *sim, double dt, double credit) {
 #pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
   for (size_t start = 0; start < count; start += GRAINS) {
     int here = (int)(count - start < GRAINS ? count - start : GRAINS);
-    tal_force_block sums;
-    for (int k = 0; k < here; k++) {
-      tal_force_record f = sum_pairs(sim, start + (size_t)k);
-      const double *member = &f.elastic_x;
-      for (int m = 0; m < 8; m++)
-        sums.force[m][k] = member[m];
-    }
-    tal_kick(sim, &sums, start, here, dt);
+    tal_force_record sums[GRAINS] = {0};
+    for (int k = 0; k < here; k++)
+      sums[k] = sum_pairs(sim, start + (size_t)k);
+    tal_kick(sim, sums, start, here, dt);
   }
   tal_kick_book(sim, credit);
 }

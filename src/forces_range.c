@@ -61,8 +61,9 @@ static void see(range *t, size_t end) {
       continue;
     }
     if (t->sweep.drifts)
-      tal_drift_group(t->sim, t->seen, count, t->sweep.dt);
-    tal_drift_records(t->sim, t->seen, count, to);
+      tal_drift_group(t->sim, t->seen, count, t->sweep.dt, to);
+    else
+      tal_drift_records(t->sim, t->seen, count, to);
   }
 }
 
@@ -141,16 +142,12 @@ static void ask(range *t, size_t slot) {
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
 
-typedef struct halves {
-  tal_lanes first, second; // of a force record
-} halves;
-
 TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block *b, int k, int count, bool friction) {
   const tal_lanes signs = {-1, -1, 1, 1}; // on j the vectors change sign, the torque does not
   tal_lanes first[4], second[4];
   tal_force_block_turn(b, k, first, second);
   for (int m = 0; m < count; m++) {
-    halves *at_i = tal_at(t->sum, at->i[k + m]), *at_j = tal_at(t->sum, at->j[k + m]);
+    tal_force_halves *at_i = tal_at(t->sum, at->i[k + m]), *at_j = tal_at(t->sum, at->j[k + m]);
     at_i->first += first[m]; // stores to one line side by side: the other order costs a tenth of a step
     if (friction)
       at_i->second += second[m];
@@ -175,47 +172,33 @@ static void add_block(range *t, const tal_places *at, const tal_force_block *b, 
     add_group(t, at, b, whole, count - whole, friction);
 }
 
-// Takes the sums of grains off the ring.
-static void take_sums(range *t, size_t start, int count, tal_force_block *out) {
-  for (int k = 0; k < count; k += 4) {
-    tal_lanes first[4], second[4];
-    for (int m = 0; m < 4; m++) {
-      halves *sum = (halves *)&t->sum[(start + (size_t)(k + m)) & t->mask];
-      first[m] = sum->first;
-      second[m] = sum->second;
-      if (k + m < count)
-        *sum = (halves){{0}, {0}};
-    }
-    tal_lanes_turn(first);
-    tal_lanes_turn(second);
-    for (int m = 0; m < 4; m++) {
-      *(tal_lanes *)&out->force[m][k] = first[m];
-      *(tal_lanes *)&out->force[4 + m][k] = second[m];
-    }
-  }
-}
-
 // ---- ranges ---------------------------------------------------------------------------------------------------------
 
 // The walls of a handful of grains, and its kick.
-static int64_t finish(range *t, int count, tal_force_block *sums) {
+static int64_t finish(range *t, int count) {
   see(t, t->done + (size_t)count);
   if (t->sim->effects & TAL_EFFECT_WALLS) {
     const int32_t *first = t->sim->neighbours.wall_first + t->done;
     tal_forces_sweep_walls(t->sim, &t->sweep, t->record, t->mask, (size_t)first[0], (size_t)first[count]);
   }
-  return tal_kick(t->sim, sums, t->done, count, t->sweep.dt);
+  return tal_kick(t->sim, t->sum + (t->done & t->mask), t->done, count, t->sweep.dt);
+}
+
+// Sums of grains that others kick.
+static void forget(range *t, size_t count) {
+  for (size_t k = 0; k < count; k++)
+    t->sum[(t->done + k) & t->mask] = (tal_force_record){0};
 }
 
 // The grains below `end` are complete; those that do not fill a handful may wait.
 static void complete(range *t, size_t end, bool all) {
   while (end > t->done && (all || end - t->done >= GRAINS)) {
     size_t count = end - t->done < GRAINS ? end - t->done : GRAINS;
-    tal_force_block sums;
-    take_sums(t, t->done, (int)count, &sums);
     if (t->kicks) {
-      int64_t fastest = finish(t, (int)count, &sums);
+      int64_t fastest = finish(t, (int)count);
       t->fastest = fastest > t->fastest ? fastest : t->fastest;
+    } else {
+      forget(t, count);
     }
     t->done += count;
   }

@@ -43,7 +43,7 @@ typedef struct tal_grains {
 #undef X
 } tal_grains;
 
-// Zeroed arrays for `count` grains, ids 0..count-1.
+// Zeroed arrays for `count` grains in whole cache lines, ids 0..count-1.
 void tal_grains_init(tal_grains *grains, size_t count);
 // Gives the SEEN fields memory where they have none, and takes it away.
 void tal_grains_show(tal_grains *grains);

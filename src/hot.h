@@ -10,7 +10,7 @@
 // X(result, name, arguments): tal_<name> of the headers above.
 #define TAL_HOT_FUNCTIONS(X)                                                                                           \
   X(int64_t, forces_range, (tal_sim * sim, const tal_sweep *sweep, int part, int parts))                               \
-  X(int64_t, drift_group, (tal_sim * sim, size_t start, int count, double dt))                                         \
+  X(int64_t, drift_group, (tal_sim * sim, size_t start, int count, double dt, tal_grain_record *record))               \
   X(double, implicit_take,                                                                                             \
     (const tal_implicit_solve *s, tal_implicit_pass pass, size_t start, int count, double factor))                     \
   X(tal_implicit_works, implicit_work, (const tal_implicit_solve *s, size_t start, int count))

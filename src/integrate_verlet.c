@@ -18,7 +18,7 @@ static double drift_all(tal_sim *sim, double dt) {
   int64_t fastest = 0;
 #pragma omp parallel for schedule(static) reduction(max : fastest) if (count > PARALLEL_FROM)
   for (size_t start = 0; start < count; start += GRAINS) {
-    int64_t here = sim->hot->drift_group(sim, start, (int)(count - start < GRAINS ? count - start : GRAINS), dt);
+    int64_t here = sim->hot->drift_group(sim, start, (int)(count - start < GRAINS ? count - start : GRAINS), dt, NULL);
     fastest = here > fastest ? here : fastest;
   }
   return tal_drift_stride(dt, fastest);

@@ -5,11 +5,17 @@
 
 #include "effects.h"
 
+#include <stdint.h>
+
 // Contacts that the implicit scheme takes at a time.
 enum { TAL_IMPLICIT_BLOCK = 64 };
 
 typedef double tal_lanes __attribute__((vector_size(32), may_alias));
 typedef double tal_lanes_pair __attribute__((vector_size(16), may_alias));
+typedef int64_t tal_lanes_bits __attribute__((vector_size(32), may_alias));
+
+// Elements i ... i + 3, i a multiple of four.
+#define TAL_LANES_AT(array, i) (*(tal_lanes *)&(array)[i])
 
 // Rows become columns: v[m][k] and v[k][m] change places.
 TAL_KERNEL void tal_lanes_turn(tal_lanes v[4]) {
@@ -19,6 +25,19 @@ TAL_KERNEL void tal_lanes_turn(tal_lanes v[4]) {
   v[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   v[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   v[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+// Squares of speeds as bits, which order like the numbers, NAN above all: of each lane the largest so far.
+TAL_KERNEL void tal_lanes_fastest(const tal_lanes *u, const tal_lanes *v, tal_lanes_bits *fastest) {
+  const tal_lanes_bits here = (tal_lanes_bits)(*u * *u + *v * *v) & INT64_MAX, faster = here > *fastest;
+  *fastest = (here & faster) | (*fastest & ~faster);
+}
+
+TAL_KERNEL int64_t tal_lanes_largest(const tal_lanes_bits *lanes) {
+  int64_t largest = (*lanes)[0];
+  for (int m = 1; m < 4; m++)
+    largest = (*lanes)[m] > largest ? (*lanes)[m] : largest;
+  return largest;
 }
 
 // Four pairs become two columns.

@@ -23,11 +23,6 @@ TAL_KERNEL double tal_double(uint64_t u) {
   return x;
 }
 
-// The square of a speed, as bits that order like the numbers, NAN above all.
-TAL_KERNEL int64_t tal_speed_bits(double u, double v) {
-  return (int64_t)(tal_bits(u * u + v * v) & INT64_MAX);
-}
-
 // a b + c, rounded once wherever it runs: an instruction from AVX2 on, exact in the library elsewhere.
 TAL_KERNEL double tal_fma(double a, double b, double c) {
   return __builtin_fma(a, b, c);
