@@ -16,8 +16,7 @@ typedef struct meetings {
 
 // What regularised friction still has to know of them.
 typedef struct rubbing {
-  double x[TAL_BLOCK], y[TAL_BLOCK]; // normal into i
-  double half_overlap[TAL_BLOCK], cap[TAL_BLOCK], slip[TAL_BLOCK];
+  double cap[TAL_BLOCK], slip[TAL_BLOCK];
   double begun[TAL_BLOCK]; // first half of the root
 } __attribute__((aligned(64))) rubbing;
 
@@ -99,22 +98,15 @@ TAL_KERNEL void fetch(meetings *b, const tal_grain_record *record, const tal_pla
 }
 
 TAL_KERNEL void rub(rubbing *r, const tal_sweep *sweep, int count, tal_force_block *out) {
-  const double *restrict x = r->x, *restrict y = r->y, *restrict slip = r->slip, *restrict cap = r->cap;
-  const double *restrict half_overlap = r->half_overlap;
-  double *restrict begun = r->begun, *restrict tx = out->force[4], *restrict ty = out->force[5];
-  double *restrict ft = out->force[6], *restrict fh = out->force[7];
+  const double *restrict slip = r->slip, *restrict cap = r->cap;
+  double *restrict begun = r->begun, *restrict friction = out->friction;
   const double inverse_vR = sweep->constants.inverse_vR, inverse_exponent = sweep->constants.inverse_exponent;
 #pragma omp simd
   for (int k = 0; k < count; k++)
     begun[k] = tal_root_begin(fabs(slip[k]) * inverse_vR, inverse_exponent);
 #pragma omp simd
-  for (int k = 0; k < count; k++) {
-    double f = tal_regularised_force(cap[k], tal_root_end(fabs(slip[k]) * inverse_vR, begun[k]), slip[k]);
-    tx[k] = -f * y[k];
-    ty[k] = f * x[k];
-    ft[k] = f;
-    fh[k] = f * half_overlap[k];
-  }
+  for (int k = 0; k < count; k++)
+    friction[k] = tal_regularised_force(cap[k], tal_root_end(fabs(slip[k]) * inverse_vR, begun[k]), slip[k]);
 }
 
 TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep *sweep, size_t start, int count,
@@ -132,9 +124,8 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   double *spring_stiffness = past ? slots->spring_stiffness + start : unused[1];
   double *new_spring = sweep->moves ? spring : unused[0];
   double *new_spring_stiffness = sweep->moves ? spring_stiffness : unused[1];
-  double *restrict ex = out->force[0], *restrict ey = out->force[1], *restrict vx = out->force[2];
-  double *restrict vy = out->force[3], *restrict tx = out->force[4], *restrict ty = out->force[5];
-  double *restrict ft = out->force[6], *restrict fh = out->force[7];
+  double *restrict nx = out->x, *restrict ny = out->y, *restrict fe = out->elastic, *restrict fd = out->viscous;
+  double *restrict ft = out->friction, *restrict half = out->half_overlap;
   const tal_law_constants constants = sweep->constants;
   const double friction = sweep->friction, dt = sweep->dt;
   const unsigned at_once = effects & ~(unsigned)TAL_EFFECT_REGULARISED;
@@ -157,22 +148,19 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
       m.spring_stiffness = spring_stiffness[k];
     }
     tal_law_force f = tal_contact_law(m, constants, at_once);
-    ex[k] = f.fe * x;
-    ey[k] = f.fe * y;
-    vx[k] = effects & TAL_EFFECT_DAMPING ? f.fd * x : 0;
-    vy[k] = effects & TAL_EFFECT_DAMPING ? f.fd * y : 0;
+    nx[k] = x;
+    ny[k] = y;
+    fe[k] = f.fe;
+    if (effects & TAL_EFFECT_DAMPING)
+      fd[k] = f.fd;
+    if (effects & TAL_EFFECT_FRICTION)
+      half[k] = half_overlap;
     if (effects & TAL_EFFECT_REGULARISED) {
-      r.x[k] = x;
-      r.y[k] = y;
-      r.half_overlap[k] = half_overlap;
       r.cap[k] = f.cap;
       r.slip[k] = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
     }
     if (effects & TAL_EFFECT_SPRING) {
-      tx[k] = -f.ft * y;
-      ty[k] = f.ft * x;
       ft[k] = f.ft;
-      fh[k] = f.ft * half_overlap;
       new_spring[k] = f.ft;
       new_spring_stiffness[k] = f.spring_stiffness;
     }

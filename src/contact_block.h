@@ -10,9 +10,12 @@
 // Slots taken at a time.
 enum { TAL_BLOCK = 64 };
 
-// Members of tal_force_record, one array each.
+// What a block of contacts answers with; of friction and damping only where the law has them.
 typedef struct tal_force_block {
-  double force[8][TAL_BLOCK];
+  double x[TAL_BLOCK], y[TAL_BLOCK];             // normal into i
+  double elastic[TAL_BLOCK], viscous[TAL_BLOCK]; // [N] along the normal: elastic force, the rest
+  double friction[TAL_BLOCK];                    // [N] along t = (-y, x)
+  double half_overlap[TAL_BLOCK];                // [m]
 } __attribute__((aligned(64))) tal_force_block;
 
 // A force record as two vectors.
@@ -45,7 +48,6 @@ tal_sweep tal_sweep_of(const tal_sim *sim, double dt);
 // Of the slots [start, start + count), 0 < count <= TAL_BLOCK, and the last one's again for the rest of the block.
 void tal_places_of(const tal_contacts *slots, size_t start, int count, size_t origin, size_t mask, tal_places *places);
 // Forces of the grain-grain slots [start, start + count), count <= TAL_BLOCK, from the records at their places.
-// Members that the effects leave out are zero.
 void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
                        size_t start, int count, tal_force_block *out);
 
@@ -59,11 +61,26 @@ TAL_KERNEL double tal_slip_speed(double nx, double ny, double ux, double uy, dou
   return slip;
 }
 
-// The records of slots k ... k + 3, two vectors of four members each.
-TAL_KERNEL void tal_force_block_turn(const tal_force_block *b, int k, tal_lanes first[4], tal_lanes second[4]) {
-  for (int m = 0; m < 4; m++) {
-    first[m] = *(const tal_lanes *)&b->force[m][k];
-    second[m] = *(const tal_lanes *)&b->force[4 + m][k];
+// The records of slots k ... k + 3, two vectors of four members each; what the effects leave out is zero.
+TAL_KERNEL void tal_force_block_turn(const tal_force_block *b, int k, tal_lanes first[4], tal_lanes second[4],
+                                     unsigned effects) {
+  const tal_lanes x = *(const tal_lanes *)&b->x[k], y = *(const tal_lanes *)&b->y[k];
+  const tal_lanes fe = *(const tal_lanes *)&b->elastic[k];
+  for (int m = 0; m < 4; m++)
+    first[m] = second[m] = (tal_lanes){0};
+  first[0] = fe * x;
+  first[1] = fe * y;
+  if (effects & TAL_EFFECT_DAMPING) {
+    const tal_lanes fd = *(const tal_lanes *)&b->viscous[k];
+    first[2] = fd * x;
+    first[3] = fd * y;
+  }
+  if (effects & TAL_EFFECT_FRICTION) {
+    const tal_lanes ft = *(const tal_lanes *)&b->friction[k];
+    second[0] = -ft * y;
+    second[1] = ft * x;
+    second[2] = ft;
+    second[3] = ft * *(const tal_lanes *)&b->half_overlap[k];
   }
   tal_lanes_turn(first);
   tal_lanes_turn(second);

@@ -13,10 +13,10 @@ enum { GRAINS = TAL_KICK_GRAINS, PARALLEL_FROM = 2000 };
 
 // ---- sweep ----------------------------------------------------------------------------------------------------------
 
-static void keep_block(const tal_force_block *b, tal_force_record *out, int count) {
+static void keep_block(const tal_force_block *b, tal_force_record *out, int count, unsigned law) {
   for (int k = 0; k < count; k += 4) {
     tal_lanes first[4], second[4];
-    tal_force_block_turn(b, k, first, second);
+    tal_force_block_turn(b, k, first, second, law);
     for (int m = 0; m < 4 && k + m < count; m++) {
       *(tal_lanes *)&out[k + m].elastic_x = first[m];
       *(tal_lanes *)&out[k + m].friction_x = second[m];
@@ -71,7 +71,7 @@ static void sweep_pairs(tal_sim *sim, double dt) {
     tal_places at;
     tal_places_of(&sim->pairs, start, here, first, UINT32_MAX, &at);
     tal_contact_block(sim, &sweep, sim->grain_records + first, &at, start, here, &b);
-    keep_block(&b, sim->force_records + start, here);
+    keep_block(&b, sim->force_records + start, here, sweep.law);
   }
 }
 

@@ -142,34 +142,44 @@ static void ask(range *t, size_t slot) {
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
 
-TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block *b, int k, int count, bool friction) {
+TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block *b, int k, int count,
+                          unsigned effects) {
   const tal_lanes signs = {-1, -1, 1, 1}; // on j the vectors change sign, the torque does not
   tal_lanes first[4], second[4];
-  tal_force_block_turn(b, k, first, second);
+  tal_force_block_turn(b, k, first, second, effects);
   for (int m = 0; m < count; m++) {
     tal_force_halves *at_i = tal_at(t->sum, at->i[k + m]), *at_j = tal_at(t->sum, at->j[k + m]);
     at_i->first += first[m]; // stores to one line side by side: the other order costs a tenth of a step
-    if (friction)
+    if (effects & TAL_EFFECT_FRICTION)
       at_i->second += second[m];
     at_j->first -= first[m];
-    if (friction)
+    if (effects & TAL_EFFECT_FRICTION)
       at_j->second += signs * second[m];
   }
 }
 
-static void add_block(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count) {
-  const bool friction = t->sweep.law & TAL_EFFECT_FRICTION;
+TAL_KERNEL void add(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count,
+                    unsigned effects) {
   const int whole = count & ~3;
   for (int k = 0; k < whole; k += 4) {
     if (k % ASK_SLOTS == 0)
       ask(t, start + (size_t)k);
-    if (friction)
-      add_group(t, at, b, k, 4, true);
-    else
-      add_group(t, at, b, k, 4, false);
+    add_group(t, at, b, k, 4, effects);
   }
   if (whole < count)
-    add_group(t, at, b, whole, count - whole, friction);
+    add_group(t, at, b, whole, count - whole, effects);
+}
+
+static void add_block(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count) {
+  const bool friction = t->sweep.law & TAL_EFFECT_FRICTION, damping = t->sweep.law & TAL_EFFECT_DAMPING;
+  if (friction && damping)
+    add(t, at, b, start, count, TAL_EFFECT_FRICTION | TAL_EFFECT_DAMPING);
+  else if (friction)
+    add(t, at, b, start, count, TAL_EFFECT_FRICTION);
+  else if (damping)
+    add(t, at, b, start, count, TAL_EFFECT_DAMPING);
+  else
+    add(t, at, b, start, count, 0);
 }
 
 // ---- ranges ---------------------------------------------------------------------------------------------------------
