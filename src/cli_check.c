@@ -57,6 +57,7 @@ static double planned_steps(const tal_scene_stage *stage) {
 static double measured_rate(tal_sim *sim) {
   double started = clock_now(), took = 0;
   const int64_t first = sim->run.step;
+  tal_sim_watch(sim, false);
   while (took < 0.5 && !tal_sim_done(sim)) {
     for (int k = 0; k < 20; k++)
       if (tal_sim_step(sim, NULL))

@@ -94,6 +94,7 @@ void tal_check_print_costs(tal_scene *scene, double step_seconds) {
   omp_set_num_threads(1);
   if (tal_sim_create(&sim, scene, &err))
     return;
+  tal_sim_watch(sim, false);
   rung ladder[RUNGS];
   const size_t count = make_rungs(sim->effects, ladder);
   const int steps = (int)fmin(fmax(4e-3 / step_seconds, 2), 1000);

@@ -43,7 +43,6 @@ TAL_KERNEL void turn_four(const tal_grains *g, size_t i, double dt, four *f, uns
   f->spin = turned;
   if (!(effects & TAL_EFFECT_SPRING))
     f->spin += turn;
-  TAL_LANES_AT(g->spin, i) = f->spin;
   f->r_spin = f->spin * TAL_LANES_AT(g->r, i);
 }
 
@@ -65,17 +64,25 @@ TAL_KERNEL void drift_four(const tal_grains *g, size_t i, double dt, four *f, ta
   TAL_LANES_AT(g->y, i) = f->y;
   TAL_LANES_AT(g->vx, i) = u;
   TAL_LANES_AT(g->vy, i) = v;
-  TAL_LANES_AT(g->ux, i) = f->ux;
-  TAL_LANES_AT(g->uy, i) = f->uy;
   tal_lanes_fastest(&u, &v, fastest);
 }
 
-TAL_KERNEL int64_t drift(const tal_grains *g, size_t start, int count, double dt, tal_grain_record *record,
-                         unsigned effects) {
+// What the laws see, for who works out their forces later.
+TAL_KERNEL void remember_four(const tal_grains *g, size_t i, const four *f, unsigned effects) {
+  TAL_LANES_AT(g->ux, i) = f->ux;
+  TAL_LANES_AT(g->uy, i) = f->uy;
+  if (effects & TAL_EFFECT_SPIN)
+    TAL_LANES_AT(g->spin, i) = f->spin;
+}
+
+TAL_KERNEL int64_t drift(const tal_grains *g, size_t start, int count, double dt, bool remembers,
+                         tal_grain_record *record, unsigned effects) {
   tal_lanes_bits fastest = {0};
   for (int k = 0; k < count; k += 4) {
     four f;
     drift_four(g, start + (size_t)k, dt, &f, &fastest, effects);
+    if (remembers)
+      remember_four(g, start + (size_t)k, &f, effects);
     if (record)
       write_four(&f, record + k);
   }
@@ -104,12 +111,13 @@ TAL_KERNEL void write_records(const tal_grains *g, size_t start, int count, tal_
 
 #define EVERY_VARIANT ONE(0) ONE(TAL_EFFECT_SPIN) ONE(TAL_EFFECT_SPRING) ONE(TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)
 
-static int64_t drift_any(const tal_grains *g, unsigned effects, size_t start, int count, double dt,
+static int64_t drift_any(const tal_sim *sim, const tal_grains *g, size_t start, int count, double dt,
                          tal_grain_record *record) {
-  switch (effects & (TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)) {
+  const bool remembers = sim->remembers;
+  switch (sim->effects & (TAL_EFFECT_SPIN | TAL_EFFECT_SPRING)) {
 #define ONE(mask)                                                                                                      \
   case (mask):                                                                                                         \
-    return drift(g, start, count, dt, record, (mask));
+    return drift(g, start, count, dt, remembers, record, (mask));
     EVERY_VARIANT
 #undef ONE
   }
@@ -117,7 +125,7 @@ static int64_t drift_any(const tal_grains *g, unsigned effects, size_t start, in
 }
 
 int64_t tal_drift_group(tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record) {
-  return drift_any(&sim->grains, sim->effects, start, count, dt, record);
+  return drift_any(sim, &sim->grains, start, count, dt, record);
 }
 
 void tal_drift_records(const tal_sim *sim, size_t start, int count, tal_grain_record *record) {
@@ -147,5 +155,5 @@ void tal_drift_foresee(const tal_sim *sim, size_t start, int count, double dt, t
   copy.inverse_mass += start;
   copy.inverse_inertia += start;
   copy.r += start;
-  drift_any(&copy, sim->effects, 0, count, dt, record);
+  drift_any(sim, &copy, 0, count, dt, record);
 }

@@ -6,6 +6,7 @@
 #include "drift.h"
 #include "kick.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -51,6 +52,10 @@ void tal_forces_forget(tal_sim *sim) {
 
 static void see_grains(tal_sim *sim) {
   const size_t count = sim->grains.count;
+  if (!sim->remembers) {
+    fprintf(stderr, "talus: forces of a step that was not watched (tal_sim_watch) are asked for\n");
+    abort();
+  }
   if (!sim->grain_records)
     sim->grain_records = tal_alloc((count + 3) / 4 * 4, sizeof *sim->grain_records);
 #pragma omp parallel for schedule(static) if (count > PARALLEL_FROM)
@@ -121,6 +126,7 @@ void tal_forces_see_now(tal_sim *sim) {
   memcpy(g->ux, g->vx, g->count * sizeof *g->ux);
   memcpy(g->uy, g->vy, g->count * sizeof *g->uy);
   memcpy(g->spin, g->omega, g->count * sizeof *g->spin);
+  sim->remembers = true;
 }
 
 // ---- slots ----------------------------------------------------------------------------------------------------------

@@ -104,8 +104,8 @@ static void find_arrays(range *t) {
   const tal_grains *g = &t->sim->grains;
   const tal_contacts *s = &t->sim->pairs;
   const unsigned effects = t->sim->effects;
-  const double *const move[] = {g->x, g->y, g->vx, g->vy, g->ux, g->uy, g->fx, g->fy, g->inverse_mass};
-  const double *const turn[] = {g->theta, g->omega, g->spin, g->torque, g->inverse_inertia, g->r};
+  const double *const move[] = {g->x, g->y, g->vx, g->vy, g->fx, g->fy, g->inverse_mass};
+  const double *const turn[] = {g->theta, g->omega, g->torque, g->inverse_inertia, g->r};
   const double *const past[] = {s->reach, s->stiffness, s->damping, s->spring, s->spring_stiffness};
   if (g->count < ASK_FROM)
     return;

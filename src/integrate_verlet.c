@@ -25,6 +25,7 @@ static double drift_all(tal_sim *sim, double dt) {
 }
 
 void tal_integrate_drift(tal_sim *sim, double dt) {
+  sim->remembers = true; // records are made from it
   const double moved = drift_all(sim, dt);
   sim->next_stride = (double)NAN;
   if (sim->boundary && sim->boundary->drift)

@@ -166,9 +166,22 @@ static int64_t cadence(double every, const tal_sim *sim) {
   return cycles < 1 ? cycle : (int64_t)cycles * cycle;
 }
 
-static bool due(const tal_sim *sim, double every) {
-  int64_t steps = cadence(every, sim);
-  return sim->run.stage_done || (steps > 0 && sim->run.stage_step % steps == 0);
+static bool falls_due(const tal_sim *sim, double every, int64_t stage_step) {
+  const int64_t steps = cadence(every, sim);
+  return steps > 0 && stage_step % steps == 0;
+}
+
+// What is written after a step.
+typedef struct looks {
+  bool row, fields, checkpoint;
+} looks;
+
+// After that step of the stage, should the stage not end there.
+static looks looks_after(const job *this, int64_t stage_step) {
+  const tal_scene_output *plan = &this->scene->output;
+  return (looks){.row = falls_due(this->sim, plan->series_every, stage_step),
+                 .fields = falls_due(this->sim, plan->fields_every, stage_step),
+                 .checkpoint = falls_due(this->sim, plan->checkpoint_every, stage_step)};
 }
 
 // phi of the row just taken where the stage has a rate, else 0. Not below the stage's pressure: a packing that is
@@ -198,29 +211,39 @@ static tal_status write_row(job *this, bool fields, tal_error *err) {
 }
 
 // Everything that looks at the run between two steps.
-static tal_status observe(job *this, tal_error *err) {
-  const tal_scene_output *plan = &this->scene->output;
-  bool fields = due(this->sim, plan->fields_every), row = fields || due(this->sim, plan->series_every);
-  tal_status status = row ? write_row(this, fields, err) : TAL_OK;
-  if (status)
-    return status;
-  int64_t steps = cadence(plan->checkpoint_every, this->sim);
-  if (tal_sim_done(this->sim) || (steps > 0 && this->sim->run.stage_step % steps == 0))
+static tal_status observe(job *this, looks due, tal_error *err) {
+  const bool ends = this->sim->run.stage_done, fields = ends || due.fields;
+  tal_status status = fields || due.row ? write_row(this, fields, err) : TAL_OK;
+  if (status == TAL_OK && (tal_sim_done(this->sim) || due.checkpoint))
     status = write_checkpoint(this, err);
   return status;
 }
 
+// One step, watched where its forces are written; a run that is asked to stop makes one that can be.
+static tal_status step(job *this, tal_error *err) {
+  tal_sim *sim = this->sim;
+  const int64_t stage = sim->run.stage;
+  const bool enters = !sim->run.stage_begun || sim->run.stage_done; // which stage the step belongs to is seen later
+  looks due = {true, true, true};
+  if (!enters)
+    due = looks_after(this, sim->run.stage_step + tal_step_small_steps(sim, sim->run.stage_step));
+  tal_sim_watch(sim, due.row || due.fields || due.checkpoint || asked_to_stop);
+  tal_status status = tal_sim_step(sim, err);
+  if (sim->run.stage != stage) { // the step belongs to the next stage
+    this->stage_started = clock_now();
+    this->stage_cpu_started = cpu_now();
+  }
+  if (status)
+    return status;
+  return observe(this, enters ? looks_after(this, sim->run.stage_step) : due, err);
+}
+
 static tal_status advance(job *this, tal_error *err) {
   while (!tal_sim_done(this->sim)) {
-    if (asked_to_stop)
+    if (asked_to_stop && this->sim->remembers)
       return TAL_INTERRUPTED;
-    int64_t stage = this->sim->run.stage;
-    tal_status status = tal_sim_step(this->sim, err);
-    if (this->sim->run.stage != stage) { // the step belongs to the next stage
-      this->stage_started = clock_now();
-      this->stage_cpu_started = cpu_now();
-    }
-    if (status || (status = observe(this, err)))
+    tal_status status = step(this, err);
+    if (status)
       return status;
     if (this->sim->run.stage_done)
       account_stage(this, this->sim->run.stage);

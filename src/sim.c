@@ -154,6 +154,7 @@ tal_status tal_sim_create(tal_sim **out, const tal_scene *scene, tal_error *err)
   }
   sim->friction = scene->material.friction;
   sim->dt = scene->integrator.dt;
+  sim->watched = true;
   tal_step_effects(sim);
   tal_neighbours_rebuild(sim);
   tal_sim_observe(sim);
@@ -203,6 +204,10 @@ const tal_scene_stage *tal_sim_stage(const tal_sim *sim) {
 
 bool tal_sim_done(const tal_sim *sim) {
   return sim->scene->stage_count == 0 || (sim->run.stage_done && (size_t)sim->run.stage + 1 >= sim->scene->stage_count);
+}
+
+void tal_sim_watch(tal_sim *sim, bool watched) {
+  sim->watched = watched;
 }
 
 tal_observed tal_sim_observe(tal_sim *sim) {

@@ -195,6 +195,8 @@ struct tal_sim {
   double dt_next;     // [s] of the step after the one being taken
   double next_stride; // [m] no grain will move further than this in the coming step; NAN: not known
   unsigned effects;   // mask of effects.h that the hot loop pays for
+  bool watched;       // as tal_sim_watch left it
+  bool remembers;     // what the laws saw last is in ux, uy, spin of the grains
   double packing_solid_fraction, packing_coordination, packing_overlap; // report of the packer
 };
 
@@ -203,6 +205,10 @@ tal_status tal_sim_create(tal_sim **sim, const tal_scene *scene, tal_error *err)
 void tal_sim_free(tal_sim *sim);
 // One time step (and, where due, the stage's refresh of the graph). TAL_INVALID with the reason when the run went bad.
 tal_status tal_sim_step(tal_sim *sim, tal_error *err);
+// Whether somebody is going to look at the forces that drive the motion after the coming steps: true at first. Steps
+// that nobody looks at remember less and cost less; where the driving forces are asked for all the same, the program
+// aborts.
+void tal_sim_watch(tal_sim *sim, bool watched);
 // True when every stage is finished.
 bool tal_sim_done(const tal_sim *sim);
 // The forces that drive the motion at this instant, as the last step left them in the slots: sums into rx, ry, rtorque.

@@ -114,10 +114,15 @@ static tal_status look(tal_sim *sim, const tal_scene_stage *plan, tal_macro *mac
   return TAL_OK;
 }
 
+// A window ends.
+static bool looks(const tal_sim *sim, const tal_scene_stage *plan) {
+  return sim->run.time - sim->run.impulse_time >= window_share * plan->ramp * (1 - 1e-9);
+}
+
 static tal_status after_step(tal_sim *sim, const tal_scene_stage *plan, tal_error *err) {
   tal_run *run = &sim->run;
   double elapsed = run->time - run->stage_start;
-  if (run->time - run->impulse_time < window_share * plan->ramp * (1 - 1e-9))
+  if (!looks(sim, plan))
     return TAL_OK;
   tal_macro macro;
   tal_status status = look(sim, plan, &macro, err);
@@ -138,4 +143,5 @@ const tal_stage tal_stage_confine = {.name = "confine",
                                      .uses_graph = true,
                                      .begin = begin,
                                      .before_step = before_step,
+                                     .looks = looks,
                                      .after_step = after_step};

@@ -99,8 +99,7 @@ static void set_friction(tal_sim *sim, const tal_scene_stage *plan) {
       sim->walls.wall[w].friction = tal_step_plate_friction(sim, plan);
 }
 
-// The same in small steps.
-static int64_t small_steps(const tal_sim *sim, int64_t done) {
+int64_t tal_step_small_steps(const tal_sim *sim, int64_t done) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   const tal_integrator *scheme = tal_integrator_find(plan->integrator.scheme);
   int64_t length = scheme->length ? scheme->length(&plan->integrator, done) : 1;
@@ -109,7 +108,7 @@ static int64_t small_steps(const tal_sim *sim, int64_t done) {
 }
 
 double tal_step_length(const tal_sim *sim, int64_t done) {
-  return (double)small_steps(sim, done) * tal_sim_stage(sim)->integrator.dt;
+  return (double)tal_step_small_steps(sim, done) * tal_sim_stage(sim)->integrator.dt;
 }
 
 double tal_step_longest(const tal_sim *sim) {
@@ -269,6 +268,14 @@ static bool inspection_due(const tal_sim *sim) {
   return sim->run.force_evaluations % every == 0;
 }
 
+// Somebody looks at the forces of the step that is about to be made: who drives the run, or the stage, which does when
+// it ends.
+static bool looked_at(const tal_sim *sim, const tal_scene_stage *plan) {
+  const tal_stage *stage = sim->stage;
+  return sim->watched || (stage->looks && stage->looks(sim, plan)) ||
+         (stage->steps && sim->run.stage_step >= stage->steps(plan));
+}
+
 tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   bool more;
   tal_status status = enter_stage(sim, &more, err);
@@ -277,11 +284,12 @@ tal_status tal_sim_step(tal_sim *sim, tal_error *err) {
   const tal_scene_stage *plan = tal_sim_stage(sim);
   tal_run *run = &sim->run;
   sim->stage->before_step(sim, plan); // pressure and wall velocities of the step (22)-(25)
-  const int64_t length = small_steps(sim, run->stage_step);
+  const int64_t length = tal_step_small_steps(sim, run->stage_step);
   run->step += length;
   run->stage_step += length;
   run->time = run->stage_start + (double)run->stage_step * plan->integrator.dt;
   sim->dt_next = tal_step_length(sim, run->stage_step);
+  sim->remembers = looked_at(sim, plan);
   tal_integrator_find(plan->integrator.scheme)->advance(sim); // (12)-(17)
   sim->dt = sim->dt_next;
   run->force_evaluations++;

@@ -10,7 +10,10 @@ void tal_step_effects(tal_sim *sim);
 tal_status tal_step_begin_stage(tal_sim *sim, tal_error *err);
 // True when the graph is part of the run now (a stage that acts on it, or strain being integrated over it).
 bool tal_step_keeps_graph(const tal_sim *sim);
-// Length [s] of the step that starts `done` small steps after the start of the stage; cut where the stage ends.
+// Small steps, of integrator.dt each, in the step that starts `done` of them after the start of the stage; cut where
+// the stage ends.
+int64_t tal_step_small_steps(const tal_sim *sim, int64_t done);
+// Length [s] of the step that starts `done` small steps after the start of the stage.
 double tal_step_length(const tal_sim *sim, int64_t done);
 // Length [s] of the longest step of the stage.
 double tal_step_longest(const tal_sim *sim);

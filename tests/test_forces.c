@@ -60,9 +60,14 @@ static void hot_step(tal_sim *sim) {
   tal_integrate_verlet_step(sim);
 }
 
+// Nobody remembers what the laws saw in a step that was not watched.
+static bool forgotten(const engine *e, const char *member) {
+  return !e->sim->remembers && (!strcmp(member, "ux") || !strcmp(member, "uy") || !strcmp(member, "spin"));
+}
+
 static void assert_same_arrays(const engine *a, const engine *b, const char *name) {
 #define X(type, member, unit, kept, meaning)                                                                           \
-  if (a->sim->grains.member && b->sim->grains.member &&                                                                \
+  if (a->sim->grains.member && b->sim->grains.member && !forgotten(a, #member) &&                                      \
       memcmp(a->sim->grains.member, b->sim->grains.member, a->sim->grains.count * sizeof(type)) != 0)                  \
     fail_msg("%s: %s differs", name, #member);
   TAL_GRAIN_FIELDS(X)
@@ -154,7 +159,8 @@ static void lonely_grains(void **state) {
 }
 
 // EXACT: a step in one pass over memory against one that drifts everything before it looks at a contact; plates and
-// pressure with it, refreshes of the graph, rebuilds of the list.
+// pressure with it, refreshes of the graph, rebuilds of the list. The one is watched now and then only: its forces are
+// the others' all the same, and its motion is that of a run that is watched always.
 static void one_pass_or_two(void **state) {
   (void)state;
   static const char *const laws[] = {"{tangential: regularised}", "{tangential: spring}", "{tangential: none}"};
@@ -176,13 +182,16 @@ static void one_pass_or_two(void **state) {
       for (int s = 0; s < 400; s++) {
         tal_error err;
         at_once += !isnan(e[0]->sim->next_stride);
+        const bool watched = s % 20 == 19;
+        tal_sim_watch(e[0]->sim, watched);
         assert_int_equal(tal_sim_step(e[0]->sim, &err), TAL_OK);
         e[1]->sim->next_stride = (double)NAN; // two passes
         assert_int_equal(tal_sim_step(e[1]->sim, &err), TAL_OK);
         assert_same_arrays(e[0], e[1], laws[k]);
+        if (watched)
+          assert_same_contacts(e[0], e[1], laws[k]);
       }
       omp_set_num_threads(1);
-      assert_same_contacts(e[0], e[1], laws[k]);
       assert_true(at_once > 350 && e[0]->sim->neighbours.rebuilds == e[1]->sim->neighbours.rebuilds);
       engine_end(e[0]);
       engine_end(e[1]);
