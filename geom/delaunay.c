@@ -60,12 +60,14 @@ static double without_dust(double value, double least) {
 static geo_site *sites_of(const double *x, const double *y, const double *weight, size_t n) {
   axis ax = axis_of(x, n), ay = axis_of(y, n);
   double size = fmax(ax.size, ay.size);
-  int exponent = size > 0 ? -ilogb(size) : 0;
+  const int exponent = size > 0 ? -ilogb(size) : 0;
+  // of the whole power one factor may be beyond the numbers
+  const double half = ldexp(1, exponent / 2), rest = ldexp(1, exponent - exponent / 2);
   geo_site *site = geo_resize(NULL, n, sizeof *site);
   for (size_t i = 0; i < n; i++) {
-    site[i].x = without_dust(ldexp(x[i] - ax.middle, exponent), 0x1p-200);
-    site[i].y = without_dust(ldexp(y[i] - ay.middle, exponent), 0x1p-200);
-    site[i].w = weight ? without_dust(ldexp(weight[i], 2 * exponent), 0x1p-450) : 0;
+    site[i].x = without_dust((x[i] - ax.middle) * half * rest, 0x1p-200);
+    site[i].y = without_dust((y[i] - ay.middle) * half * rest, 0x1p-200);
+    site[i].w = weight ? without_dust(weight[i] * half * half * rest * rest, 0x1p-450) : 0;
   }
   return site;
 }
