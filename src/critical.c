@@ -37,14 +37,27 @@ static bool touches(pair_gap gap) {
   return gap.square < gap.reach * gap.reach;
 }
 
+// What the slopes of all slots have in common.
+typedef struct slopes {
+  bool hertz, damped, own; // own: each slot has a damping of its own
+  double damping_time;     // [s] damping over stiffness, else
+} slopes;
+
+static slopes slopes_of(const tal_sim *sim, const tal_contacts *s) {
+  // solved damping is stable for any step
+  const bool damped = (sim->effects & TAL_EFFECT_DAMPING) && !(sim->effects & TAL_EFFECT_IMPLICIT);
+  return (slopes){.hertz = sim->effects & TAL_EFFECT_HERTZ,
+                  .damped = damped,
+                  .own = s->damping != NULL,
+                  .damping_time = tal_damping_time_of_slots(sim)};
+}
+
 // Tangent stiffness and damping of a touching slot.
-static void slot_slopes(const tal_sim *sim, const tal_contacts *s, size_t c, double overlap, double *stiffness,
-                        double *damping) {
-  const double root = sqrt(overlap), own = tal_damping_of_slot(sim, s, c);
-  *stiffness = sim->effects & TAL_EFFECT_HERTZ ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
-  *damping = sim->effects & TAL_EFFECT_HERTZ ? own * root : own;
-  if (sim->effects & TAL_EFFECT_IMPLICIT)
-    *damping = 0; // solved, and stable for any step
+static inline void slot_slopes(slopes of, const tal_contacts *s, size_t c, double overlap, double *stiffness,
+                               double *damping) {
+  const double root = of.hertz ? sqrt(overlap) : 1, own = of.own ? s->damping[c] : of.damping_time * s->stiffness[c];
+  *stiffness = of.hertz ? tal_hertz_slope(s->stiffness[c], root) : s->stiffness[c];
+  *damping = of.damped ? own * root : 0;
 }
 
 // How much stiffer than the normal spring the tangential one is to grain i, turning included; at least 1.
@@ -57,12 +70,14 @@ static double sideways(const tal_sim *sim, size_t i) {
 // Tangent stiffness and damping of all contacts of each grain.
 static void add_up(const tal_sim *sim, double (*sum)[2]) {
   const tal_contacts *s = &sim->pairs, *w = &sim->wall_contacts;
+  const slopes of_pairs = slopes_of(sim, s), of_walls = slopes_of(sim, w);
   double k, d;
-  for (size_t c = 0; c < s->count; c++) {
+  for (size_t c = 0; c < s->count; c++) { // without a branch: which slots touch is hard to foresee
     const pair_gap gap = pair_of(sim, c);
-    if (!touches(gap))
-      continue;
-    slot_slopes(sim, s, c, gap.reach - sqrt(gap.square), &k, &d);
+    const double overlap = gap.reach - sqrt(gap.square), share = touches(gap);
+    slot_slopes(of_pairs, s, c, overlap > 0 ? overlap : 0, &k, &d);
+    k *= share;
+    d *= share;
     sum[s->i[c]][0] += k;
     sum[s->i[c]][1] += d;
     sum[s->j[c]][0] += k;
@@ -71,7 +86,7 @@ static void add_up(const tal_sim *sim, double (*sum)[2]) {
   for (size_t c = 0; c < w->count; c++) {
     if (w->overlap[c] <= 0)
       continue;
-    slot_slopes(sim, w, c, w->overlap[c], &k, &d);
+    slot_slopes(of_walls, w, c, w->overlap[c], &k, &d);
     sum[w->i[c]][0] += k;
     sum[w->i[c]][1] += d;
   }
@@ -85,12 +100,9 @@ typedef struct least_step {
   int64_t grain;
 } least_step;
 
-// One contact's limit, worked out only where its polynomial says that it is below the least so far.
-static void look(double lambda, double gamma, int64_t id, least_step *least) {
-  const double step = least->step;
-  const bool below = isfinite(step) ? (0.25 * lambda * step + gamma) * step > 1 : lambda > 0 || gamma > 0;
-  if (below)
-    *least = (least_step){limit(lambda, gamma), id};
+// A limit is worked out only where its polynomial says that it is below the least so far.
+static bool below(double lambda, double gamma, double step) {
+  return isfinite(step) ? (0.25 * lambda * step + gamma) * step > 1 : lambda > 0 || gamma > 0;
 }
 
 double tal_critical_step_where(const tal_sim *sim, int64_t *grain) {
@@ -107,12 +119,14 @@ double tal_critical_step_where(const tal_sim *sim, int64_t *grain) {
   }
   for (size_t c = 0; c < s->count; c++) {
     const double *a = sum[s->i[c]], *b = sum[s->j[c]];
-    if (touches(pair_of(sim, c)))
-      look(a[0] + b[0], a[1] + b[1], g->id[s->i[c]], &least);
+    if (below(a[0] + b[0], a[1] + b[1], least.step) && touches(pair_of(sim, c)))
+      least = (least_step){limit(a[0] + b[0], a[1] + b[1]), g->id[s->i[c]]};
   }
-  for (size_t c = 0; c < w->count; c++)
-    if (w->overlap[c] > 0)
-      look(sum[w->i[c]][0], sum[w->i[c]][1], g->id[w->i[c]], &least);
+  for (size_t c = 0; c < w->count; c++) {
+    const double *a = sum[w->i[c]];
+    if (w->overlap[c] > 0 && below(a[0], a[1], least.step))
+      least = (least_step){limit(a[0], a[1]), g->id[w->i[c]]};
+  }
   free(sum);
   *grain = least.grain;
   return least.step;
