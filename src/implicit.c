@@ -5,7 +5,7 @@
 #include "law.h"
 
 // Grains from which threads pay.
-enum { PARALLEL_FROM = 2000 };
+enum { PARALLEL_FROM = TAL_IMPLICIT_TILES_FROM };
 // Sweeps beyond the scene's number when friction would do work, or while the tolerance is not met.
 enum { MORE_SWEEPS = 20, MOST_SWEEPS = 200 };
 // Passes that go through the tiles together.

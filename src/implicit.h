@@ -90,8 +90,9 @@ typedef struct tal_implicit {
   int64_t sweeps;          // since the start, for reports
 } tal_implicit;
 
-// Lanes of a vector.
-enum { TAL_IMPLICIT_VECTOR = 8 };
+// Lanes of a vector; grains from which a sample has several tiles. The passes over one tile are one thread's, and
+// grains that others have touched in between would have to come back to it.
+enum { TAL_IMPLICIT_VECTOR = 8, TAL_IMPLICIT_TILES_FROM = 8000 };
 
 void tal_implicit_init(tal_implicit *system);
 void tal_implicit_clear(tal_implicit *system);

@@ -11,9 +11,9 @@
 #include <string.h>
 
 enum { COLOURS = 64 };
-// Grains of a tile, at least: a few tiles fit into the L2 cache. Smaller samples than TILES_FROM are one tile: they
-// gain nothing, and one sweep over even and odd tiles leaves some per cent more unbalanced than one over the whole.
-enum { TILE = 256, TILES_FROM = 8000 };
+// Grains of a tile, at least: a few tiles fit into the L2 cache. Small samples are one tile: they gain nothing, and one
+// sweep over even and odd tiles leaves some per cent more unbalanced than one over the whole.
+enum { TILE = 256, TILES_FROM = TAL_IMPLICIT_TILES_FROM };
 
 void tal_implicit_init(tal_implicit *system) {
   *system = (tal_implicit){0};

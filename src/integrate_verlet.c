@@ -15,8 +15,9 @@ enum { GRAINS = TAL_DRIFT_GRAINS, PARALLEL_FROM = 2000 };
 // Returns what no grain has moved further than [m].
 static double drift_all(tal_sim *sim, double dt) {
   const size_t count = sim->grains.count;
+  const size_t parallel_from = sim->effects & TAL_EFFECT_IMPLICIT ? TAL_IMPLICIT_TILES_FROM : PARALLEL_FROM;
   int64_t fastest = 0;
-#pragma omp parallel for schedule(static) reduction(max : fastest) if (count > PARALLEL_FROM)
+#pragma omp parallel for schedule(static) reduction(max : fastest) if (count > parallel_from)
   for (size_t start = 0; start < count; start += GRAINS) {
     int64_t here = sim->hot->drift_group(sim, start, (int)(count - start < GRAINS ? count - start : GRAINS), dt, NULL);
     fastest = here > fastest ? here : fastest;
