@@ -16,7 +16,8 @@ typedef struct meetings {
 
 // What regularised friction still has to know of them.
 typedef struct rubbing {
-  double cap[TAL_BLOCK], slip[TAL_BLOCK];
+  double cap[TAL_BLOCK];
+  double slip[TAL_BLOCK];  // over vR
   double begun[TAL_BLOCK]; // first half of the root
 } __attribute__((aligned(64))) rubbing;
 
@@ -100,13 +101,13 @@ TAL_KERNEL void fetch(meetings *b, const tal_grain_record *record, const tal_pla
 TAL_KERNEL void rub(rubbing *r, const tal_sweep *sweep, int count, tal_force_block *out) {
   const double *restrict slip = r->slip, *restrict cap = r->cap;
   double *restrict begun = r->begun, *restrict friction = out->friction;
-  const double inverse_vR = sweep->constants.inverse_vR, inverse_exponent = sweep->constants.inverse_exponent;
+  const double inverse_exponent = sweep->constants.inverse_exponent;
 #pragma omp simd
   for (int k = 0; k < count; k++)
-    begun[k] = tal_root_begin(fabs(slip[k]) * inverse_vR, inverse_exponent);
+    begun[k] = tal_root_begin(fabs(slip[k]), inverse_exponent);
 #pragma omp simd
   for (int k = 0; k < count; k++)
-    friction[k] = tal_regularised_force(cap[k], tal_root_end(fabs(slip[k]) * inverse_vR, begun[k]), slip[k]);
+    friction[k] = tal_regularised_force(cap[k], tal_root_end(fabs(slip[k]), begun[k]), slip[k]);
 }
 
 TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep *sweep, size_t start, int count,
@@ -157,7 +158,7 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
       half[k] = half_overlap;
     if (effects & TAL_EFFECT_REGULARISED) {
       r.cap[k] = f.cap;
-      r.slip[k] = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects);
+      r.slip[k] = tal_slip_speed(x, y, ux[k], uy[k], half_overlap, speeds[k], spins[k], effects) * constants.inverse_vR;
     }
     if (effects & TAL_EFFECT_SPRING) {
       ft[k] = f.ft;
