@@ -8,20 +8,22 @@
 
 // ---- which grain ----
 
-static void count_touching(const tal_contacts *slots, bool pairs, int *count) {
-  for (size_t c = 0; c < slots->count; c++) {
-    if (slots->overlap[c] <= 0)
-      continue;
-    count[slots->i[c]]++;
-    if (pairs)
-      count[slots->j[c]]++;
-  }
+// The grains of a slot, from the centres as they stand: overlaps are kept only where someone looks.
+static bool touch(const tal_grains *g, int32_t i, int32_t j) {
+  const double dx = g->x[i] - g->x[j], dy = g->y[i] - g->y[j], reach = g->r[i] + g->r[j];
+  return dx * dx + dy * dy < reach * reach;
 }
 
 void tal_forced_contacts(const tal_sim *sim, int *count) {
+  const tal_contacts *s = &sim->pairs, *w = &sim->wall_contacts;
   memset(count, 0, sim->grains.count * sizeof *count);
-  count_touching(&sim->pairs, true, count);
-  count_touching(&sim->wall_contacts, false, count);
+  for (size_t c = 0; c < s->count; c++)
+    if (touch(&sim->grains, s->i[c], s->j[c])) {
+      count[s->i[c]]++;
+      count[s->j[c]]++;
+    }
+  for (size_t c = 0; c < w->count; c++)
+    count[w->i[c]] += w->overlap[c] > 0;
 }
 
 // The nearest to the mean of all centres; rattlers only where nothing bears.

@@ -1,6 +1,6 @@
 // The force of every slot kept in a record of its own: for observers, and for friction that is solved after the sweep.
-// The last step kept nothing; its forces are worked out again from what the laws saw of the grains, to the same bits:
-// a spring that stands at its force and does not move answers with that force.
+// The last step kept nothing; where it was watched (tal_sim_watch) its forces are worked out again from what the laws
+// saw of the grains, to the same bits: a spring that stands at its force and does not move answers with that force.
 #include "forces.h"
 
 #include "drift.h"

@@ -332,6 +332,7 @@ void tal_sim_restored(tal_sim *sim) {
   sim->stage = plan ? tal_stage_find(plan->kind) : NULL;
   sim->boundary = NULL;
   sim->boundary_moved = true;
+  tal_boundary_let_go(sim); // what the first stage's pressed
   sim->next_stride = (double)NAN;
   if (plan && !sim->run.stage_begun)
     sim->stage = NULL;

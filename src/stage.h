@@ -16,7 +16,8 @@ struct tal_stage {
   tal_status (*begin)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);
   // Before each step: pressure and wall velocities of the step.
   void (*before_step)(tal_sim *sim, const tal_scene_stage *plan);
-  // Whether after_step is going to look at the forces of the step that ends at run.time; NULL: only where it ends.
+  // Whether after_step is going to look at the forces of the step that ends at run.time. NULL: only where `steps` are
+  // done; a stage that does not know its steps beforehand has to say, for the last look is at its end.
   bool (*looks)(const tal_sim *sim, const tal_scene_stage *plan);
   // After each step (and once after begin): sets run.stage_done, or fails with what was reached.
   tal_status (*after_step)(tal_sim *sim, const tal_scene_stage *plan, tal_error *err);

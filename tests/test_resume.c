@@ -350,6 +350,20 @@ static void friction_that_comes_back(void **state) {
   }
 }
 
+// A stage without a boundary after one that presses.
+static const char pressed_and_free[] =
+    "grains: {count: 50, radius: {law: uniform, min: 0.4e-3, max: 1.0e-3}, thickness: 1.5e-3}\n"
+    "material: {young: 30e9, poisson: 0.3, density: 2675, friction: 0.45, damping: 0.002}\nmass_scaling: 1e5\n"
+    "pack: {method: drop_and_roll, width: 9e-3}\ncontinuum: {refresh: 50}\nintegrator: {dt: 1e-5}\n"
+    "stages:\n  - {kind: compress, pressure: 100e3, rate: 0.5, strain: 0.001}\n"
+    "  - {kind: free, duration: 0.006}\n";
+
+// EXACT: nothing is left of the pressure that a new simulation of the scene begins with.
+static void pressure_that_ends(void **state) {
+  (void)state;
+  restore_at_any_step(pressed_and_free, 2, 8);
+}
+
 int main(int argc, char **argv) {
   if (argc > 1)
     cmocka_set_test_filter(argv[1]);
@@ -358,6 +372,7 @@ int main(int argc, char **argv) {
       cmocka_unit_test(interrupted_and_resumed), cmocka_unit_test(schemes_in_turn),
       cmocka_unit_test(other_number_of_threads), cmocka_unit_test(killed_and_resumed),
       cmocka_unit_test(restored_at_any_step),    cmocka_unit_test(friction_that_comes_back),
+      cmocka_unit_test(pressure_that_ends),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

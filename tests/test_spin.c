@@ -104,6 +104,21 @@ static void from_another_run(void **state) {
   assert_refused(p, "no run", WORDS("run", "s.yaml", "-o", "x", "--from", "nowhere"), 4, "nowhere");
 }
 
+// EXACT: a forced run that goes bad stops with its reason, in the file too.
+static void gone_bad(void **state) {
+  program *p = *state;
+  outcome got;
+  program_write(p, "s.yaml", patch);
+  program_run(p,
+              WORDS("run", "s.yaml", "-o", "bad", "-q", "--no-figures", "--set", "limits={stride: 1e-5}", "--set",
+                    "stages.0.omega=1e4", "--set", "integrator={scheme: verlet, dt: 1e-6, force: true}"),
+              &got);
+  assert_outcome("gone bad", &got, 3, "limits.stride"); // long after the last look
+  char *report = text_of(p, "bad/run.json");
+  assert_holds(report, "invalid");
+  free(report);
+}
+
 #define ENSEMBLE "run", "s.yaml", "-o", "e", "-t", "2", "-q", "--no-figures", "--set"
 
 // EXACT: an ensemble is a run to the common state and a run for each grain; a grain's run is the scene with that grain;
@@ -175,10 +190,8 @@ static void rotation(void **state) {
 
 int main(void) {
   const struct CMUnitTest tests[] = {
-      program_test(bad_input),
-      program_test(from_another_run),
-      program_test(ensemble),
-      program_test(rotation),
+      program_test(bad_input), program_test(from_another_run), program_test(gone_bad),
+      program_test(ensemble),  program_test(rotation),
   };
   return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -85,8 +85,10 @@ void measured_steps(tal_sim *sim, tal_output *output, bool frame);
 __attribute__((noinline)) void measured_steps(tal_sim *sim, tal_output *output, bool frame) {
   tal_error err;
   tal_status status = TAL_OK;
-  for (int k = 0; k < STEPS && !status; k++)
+  for (int k = 0; k < STEPS && !status; k++) {
+    tal_sim_watch(sim, output && k == STEPS - 1);
     status = tal_sim_step(sim, &err);
+  }
   if (!status && output) {
     tal_row row;
     tal_sim_row(sim, &row);
