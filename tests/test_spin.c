@@ -110,8 +110,9 @@ static void gone_bad(void **state) {
   outcome got;
   program_write(p, "s.yaml", patch);
   program_run(p,
-              WORDS("run", "s.yaml", "-o", "bad", "-q", "--no-figures", "--set", "limits={stride: 1e-5}", "--set",
-                    "stages.0.omega=1e4", "--set", "integrator={scheme: verlet, dt: 1e-6, force: true}"),
+              WORDS("run", "s.yaml", "-o", "bad", "-q", "--no-figures", "--set", "limits={stride: 1e-4}", "--set",
+                    "integrator={scheme: verlet, dt: 1e-6, force: true}", "--set", "output={series_every: 5e-3}",
+                    "--set", "stages=[{kind: spin, pressure: 1e3, omega: 5e4, ramp: 0.01, hold: 0.05}]"),
               &got);
   assert_outcome("gone bad", &got, 3, "limits.stride"); // long after the last look
   char *report = text_of(p, "bad/run.json");
