@@ -52,6 +52,8 @@ typedef struct peeler {
   unsigned char *on_loop; // [points] is or was on the loop; no triangle inside asks about those that left it
   wide_edge *heap;        // widest on top
   size_t count, capacity;
+  int32_t (*outer)[2]; // triangle and opposite corner of every edge that was outer at some time
+  size_t outer_count, outer_capacity, removed;
 } peeler;
 
 static wide_edge edge_of(const peeler *p, int32_t t, int k) {
@@ -106,6 +108,11 @@ static bool is_outer(const peeler *p, int32_t t, int k) {
 static void expose(peeler *p, int32_t t, int k) {
   wide_edge edge = edge_of(p, t, k);
   p->on_loop[edge.i] = p->on_loop[edge.j] = 1;
+  if (p->outer_count == p->outer_capacity) {
+    p->outer_capacity = geo_capacity(p->outer_capacity, p->outer_count + 1);
+    p->outer = geo_resize(p->outer, p->outer_capacity, sizeof *p->outer);
+  }
+  memcpy(p->outer[p->outer_count++], (int32_t[2]){t, k}, sizeof *p->outer);
   if (edge.gap > p->gap_limit)
     push(p, edge);
 }
@@ -127,6 +134,7 @@ static bool may_remove(const peeler *p, int32_t t, int k) {
 
 static void remove_triangle(peeler *p, int32_t t) {
   p->inside[t] = 0;
+  p->removed++;
   for (int m = 0; m < 3; m++) {
     int32_t u = p->mesh->neighbour[t][m];
     if (u < 0 || !p->inside[u])
@@ -136,30 +144,29 @@ static void remove_triangle(peeler *p, int32_t t) {
   }
 }
 
+// Points of a triangulated disk with so many edges around it (Euler).
+static size_t points_of(size_t triangles, size_t rim) {
+  return triangles ? (triangles + rim + 2) / 2 : 0;
+}
+
 // Writes the loop around the inside triangles and counts the points outside.
-static void trace(geo_loop *loop, const peeler *p) {
+static void trace(geo_loop *loop, const peeler *p, size_t hull) {
   const geo_mesh *mesh = p->mesh;
   int32_t *next = geo_resize(NULL, mesh->point_count, sizeof *next), start = INT32_MAX;
-  unsigned char *used = geo_zeroed(mesh->point_count, 1); // 1 in the mesh, 2 inside
   size_t edges = 0;
-  for (size_t t = 0; t < mesh->triangle_count; t++) {
-    loop->triangle_count += p->inside[t];
-    for (int k = 0; k < 3; k++) {
-      int32_t a = mesh->corner[t][k];
-      used[a] |= p->inside[t] ? 3 : 1;
-      if (!p->inside[t] || !is_outer(p, (int32_t)t, (k + 2) % 3))
-        continue;
-      next[a] = mesh->corner[t][(k + 1) % 3];
-      start = a < start ? a : start;
-      edges++;
-    }
+  for (size_t e = 0; e < p->outer_count; e++) {
+    const int32_t t = p->outer[e][0], k = p->outer[e][1], *corner = mesh->corner[t], a = corner[(k + 1) % 3];
+    if (!p->inside[t])
+      continue;
+    next[a] = corner[(k + 2) % 3];
+    start = a < start ? a : start;
+    edges++;
   }
-  for (size_t i = 0; i < mesh->point_count; i++)
-    loop->outside_count += used[i] == 1;
   reserve(loop, edges);
   for (int32_t a = start; loop->count < edges; a = next[a])
     loop->node[loop->count++] = a;
-  free(used);
+  loop->triangle_count = mesh->triangle_count - p->removed;
+  loop->outside_count = points_of(mesh->triangle_count, hull) - points_of(loop->triangle_count, edges);
   free(next);
 }
 
@@ -168,17 +175,21 @@ int geo_loop_peel(geo_loop *loop, const geo_mesh *mesh, const double *x, const d
   peeler p = {.mesh = mesh, .x = x, .y = y, .radius = radius, .side = side, .gap_limit = gap_limit, .inside = inside};
   p.on_loop = geo_zeroed(mesh->point_count, 1);
   memset(inside, 1, mesh->triangle_count);
-  for (size_t t = 0; t < mesh->triangle_count; t++)
-    for (int k = 0; k < 3; k++)
-      if (mesh->neighbour[t][k] < 0)
+  for (size_t t = 0; t < mesh->triangle_count; t++) {
+    const int32_t *u = mesh->neighbour[t];
+    for (int k = 0; k < 3 && (u[0] | u[1] | u[2]) < 0; k++)
+      if (u[k] < 0)
         expose(&p, (int32_t)t, k);
+  }
+  const size_t hull = p.outer_count;
   while (p.count) {
     wide_edge edge = pop(&p);
     if (inside[edge.t] && may_remove(&p, edge.t, edge.k))
       remove_triangle(&p, edge.t);
   }
   loop->count = loop->outside_count = loop->triangle_count = 0;
-  trace(loop, &p);
+  trace(loop, &p, hull);
+  free(p.outer);
   free(p.heap);
   free(p.on_loop);
   return loop->count ? 0 : -1;

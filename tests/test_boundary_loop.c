@@ -108,7 +108,7 @@ static void check_simple(const assembly *a) {
 // Identities of one simple loop around triangles: Euler's count, area, normals, and that nothing more can be peeled.
 static void check_identities(const assembly *a, double limit) {
   const geo_mesh *mesh = &a->mesh;
-  size_t used = 0, triangles = 0;
+  size_t used = 0, outside = 0, triangles = 0;
   unsigned char seen[MAX_POINTS] = {0}, on_loop[MAX_POINTS] = {0};
   double area = 0;
   for (size_t t = 0; t < mesh->triangle_count; t++) {
@@ -116,13 +116,16 @@ static void check_identities(const assembly *a, double limit) {
     if (a->inside[t])
       area += geo_mesh_area(mesh, a->x, a->y, t);
     for (int k = 0; k < 3; k++)
-      seen[mesh->corner[t][k]] = 1;
+      seen[mesh->corner[t][k]] |= a->inside[t] ? 3 : 1;
   }
-  for (size_t i = 0; i < a->n; i++)
-    used += seen[i];
+  for (size_t i = 0; i < a->n; i++) {
+    used += seen[i] != 0;
+    outside += seen[i] == 1;
+  }
   for (size_t k = 0; k < a->loop.count; k++)
     on_loop[a->loop.node[k]] = 1;
   assert_int_equal(triangles, a->loop.triangle_count);
+  assert_int_equal(outside, a->loop.outside_count);
   assert_int_equal(triangles, 2 * (used - a->loop.outside_count) - a->loop.count - 2);
   double enclosed = geo_loop_area(&a->loop, a->x, a->y);
   assert_true(area > 0 && fabs(enclosed - area) < 1e-13 * (double)triangles * area);
