@@ -1,5 +1,6 @@
-// Four grains at a time: their sums are turned into lanes that never see memory. The work of this step's forces: dt f .
-// v is the exact discrete work of a force that acts over the two half kicks around the instant of v [eq (16)].
+// Four grains at a time: their sums are turned into lanes that never see memory. The work of this step's forces: the
+// power f . v over dt is the exact discrete work of a force that acts over the two half kicks around the instant of v
+// [eq (16)].
 #include "kick.h"
 
 #include "root.h"
