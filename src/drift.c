@@ -64,7 +64,8 @@ TAL_KERNEL void drift_four(const tal_grains *g, size_t i, double dt, four *f, ta
   TAL_LANES_AT(g->y, i) = f->y;
   TAL_LANES_AT(g->vx, i) = u;
   TAL_LANES_AT(g->vy, i) = v;
-  tal_lanes_fastest(&u, &v, fastest);
+  if (fastest)
+    tal_lanes_fastest(&u, &v, fastest);
 }
 
 // What the laws see, for who works out their forces later.
@@ -80,7 +81,7 @@ TAL_KERNEL int64_t drift(const tal_grains *g, size_t start, int count, double dt
   tal_lanes_bits fastest = {0};
   for (int k = 0; k < count; k += 4) {
     four f;
-    drift_four(g, start + (size_t)k, dt, &f, &fastest, effects);
+    drift_four(g, start + (size_t)k, dt, &f, record ? NULL : &fastest, effects);
     if (remembers)
       remember_four(g, start + (size_t)k, &f, effects);
     if (record)
