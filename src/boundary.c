@@ -1,5 +1,7 @@
 #include "boundary.h"
 
+#include "kick.h"
+
 #include <stdlib.h>
 #include <string.h>
 
@@ -13,10 +15,19 @@ const tal_boundary *tal_boundary_find(const char *name) {
   return NULL;
 }
 
+// What presses acts on the loop's grains alone.
+static void mark_pressed(tal_sim *sim) {
+  const bool loop_only = sim->boundary && sim->boundary->press;
+  memset(sim->pressed, !loop_only, sim->grains.count / TAL_KICK_GRAINS + 1);
+  for (size_t k = 0; loop_only && k < sim->graph.loop.count; k++)
+    sim->pressed[sim->graph.loop.node[k] / TAL_KICK_GRAINS] = 1;
+}
+
 void tal_boundary_let_go(tal_sim *sim) {
   tal_grains *g = &sim->grains;
   if (!sim->boundary_moved)
     return;
+  mark_pressed(sim);
   memset(g->bx, 0, g->count * sizeof *g->bx);
   memset(g->by, 0, g->count * sizeof *g->by);
   sim->boundary_moved = false;

@@ -113,8 +113,6 @@ static void find_arrays(range *t) {
     put(&t->of_grains, move[m]);
   for (size_t m = 0; effects & TAL_EFFECT_SPIN && m < sizeof turn / sizeof *turn; m++)
     put(&t->of_grains, turn[m]);
-  put(&t->of_grains, effects & TAL_EFFECT_BOUNDARY ? g->bx : NULL);
-  put(&t->of_grains, effects & TAL_EFFECT_BOUNDARY ? g->by : NULL);
   put(&t->of_grains, effects & TAL_EFFECT_GRAVITY ? g->mass : NULL);
   for (size_t m = 0; m < sizeof past / sizeof *past; m++)
     put(&t->of_slots, past[m]);
@@ -137,6 +135,10 @@ static void ask(range *t, size_t slot) {
     return;
   for (int m = 0; m < t->of_grains.count; m++)
     __builtin_prefetch(t->of_grains.array[m] + grain, 1);
+  if (t->sim->effects & TAL_EFFECT_BOUNDARY && t->sim->pressed[grain / GRAINS]) {
+    __builtin_prefetch(t->sim->grains.bx + grain);
+    __builtin_prefetch(t->sim->grains.by + grain);
+  }
   t->asked = grain + ASK_GRAINS;
 }
 

@@ -156,6 +156,8 @@ int64_t tal_kick(tal_sim *sim, tal_force_record *sums, size_t start, int count, 
                                      TAL_EFFECT_HELD);
   if (sim->effects & TAL_EFFECT_FRICTION)
     effects |= TAL_EFFECT_REGULARISED; // either law: the forces are there
+  if (!sim->pressed[start / TAL_KICK_GRAINS])
+    effects &= ~(unsigned)TAL_EFFECT_BOUNDARY;
   if (sim->effects & TAL_EFFECT_WALLS)
     add_walls(sim, sums, start, count);
   switch (effects) {

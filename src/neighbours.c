@@ -254,7 +254,9 @@ static void list_all(tal_sim *sim) {
     free(n->wall_first);
     n->wall_first = tal_alloc(g->count + 1, sizeof *n->wall_first);
     free(sim->powers);
+    free(sim->pressed);
     sim->powers = tal_alloc(g->count / TAL_KICK_GRAINS + 1, sizeof *sim->powers);
+    sim->pressed = tal_alloc(g->count / TAL_KICK_GRAINS + 1, sizeof *sim->pressed);
     n->grain_capacity = g->count;
   }
   tal_implicit_save(sim);

@@ -190,6 +190,7 @@ void tal_sim_free(tal_sim *sim) {
   free(sim->rings);
   free(sim->loop_centre);
   free(sim->powers);
+  free(sim->pressed);
   tal_graph_clear(&sim->graph);
   free(sim);
 }

@@ -177,6 +177,7 @@ struct tal_sim {
   tal_force_record *sums;          // owned; [ring_capacity] rings of the hot loop, zero between steps
   tal_grain_record *rings;         // owned; [2 ring_capacity] rings of the hot loop
   tal_kick_powers *powers;         // owned; [grains / TAL_KICK_GRAINS + 1] of this step
+  unsigned char *pressed;          // owned; [as powers] 0: the boundary acts on none of these grains
   size_t force_capacity, ring_capacity;
   bool forces_kept; // the force records are those of the last step or sweep
   tal_neighbours neighbours;
