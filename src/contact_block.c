@@ -7,7 +7,7 @@
 
 // What a block of contacts brings; one array per quantity.
 typedef struct meetings {
-  double dx[TAL_BLOCK], dy[TAL_BLOCK]; // centre i - centre j
+  double distance[TAL_BLOCK];          // of the centres
   double ux[TAL_BLOCK], uy[TAL_BLOCK]; // velocity i - velocity j
   double hx[TAL_BLOCK], hy[TAL_BLOCK]; // the same in the middle of the step
   double spins[TAL_BLOCK];             // sum of the spins
@@ -33,28 +33,15 @@ tal_sweep tal_sweep_of(const tal_sim *sim, double dt) {
                                    .tangential_ratio = sim->constants.tangential_ratio}};
 }
 
-void tal_places_of(const tal_contacts *slots, size_t start, int count, size_t origin, size_t mask, tal_places *places) {
-  const int32_t *restrict i = slots->i + start, *restrict j = slots->j + start;
-  const uint32_t first = (uint32_t)origin, within = (uint32_t)mask;
-  for (int k = 0; k < count; k++) {
-    places->i[k] = (((uint32_t)i[k] - first) & within) * (uint32_t)sizeof(tal_grain_record);
-    places->j[k] = (((uint32_t)j[k] - first) & within) * (uint32_t)sizeof(tal_grain_record);
-  }
-  for (int k = count; k < TAL_BLOCK; k++) {
-    places->i[k] = places->i[count - 1];
-    places->j[k] = places->j[count - 1];
-  }
-}
-
-// Centres, and velocities where the law needs them. i, j: records.
-TAL_KERNEL void fetch_translation(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4],
-                                  int k, unsigned effects) {
+// way: centre i - centre j; velocities where the law needs them. i, j: records.
+TAL_KERNEL void fetch_first(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4], int k,
+                            tal_lanes way[2], unsigned effects) {
   tal_lanes v[4];
   for (int m = 0; m < 4; m++)
     v[m] = *(const tal_lanes *)&i[m]->x - *(const tal_lanes *)&j[m]->x;
   tal_lanes_turn(v);
-  *(tal_lanes *)&b->dx[k] = v[0];
-  *(tal_lanes *)&b->dy[k] = v[1];
+  way[0] = v[0];
+  way[1] = v[1];
   if (effects & (TAL_EFFECT_DAMPING | TAL_EFFECT_REGULARISED)) {
     *(tal_lanes *)&b->ux[k] = v[2];
     *(tal_lanes *)&b->uy[k] = v[3];
@@ -71,31 +58,49 @@ TAL_KERNEL void fetch_spin(meetings *b, const tal_grain_record *const i[4], cons
   *(tal_lanes *)&b->speeds[k] = v[1];
 }
 
-TAL_KERNEL void fetch_middle(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4],
+// Velocities in the middle of the step and spins.
+TAL_KERNEL void fetch_second(meetings *b, const tal_grain_record *const i[4], const tal_grain_record *const j[4],
                              int k) {
-  tal_lanes_pair p[4];
-  tal_lanes v[2];
+  const tal_lanes_bits minus = {INT64_MIN, INT64_MIN, 0, 0}; // spins add up
+  tal_lanes v[4];
   for (int m = 0; m < 4; m++)
-    p[m] = *(const tal_lanes_pair *)&i[m]->hx - *(const tal_lanes_pair *)&j[m]->hx;
-  tal_lanes_turn_pairs(p, v);
+    v[m] = *(const tal_lanes *)&i[m]->hx + (tal_lanes)(*(const tal_lanes_bits *)&j[m]->hx ^ minus);
+  tal_lanes_turn(v);
   *(tal_lanes *)&b->hx[k] = v[0];
   *(tal_lanes *)&b->hy[k] = v[1];
+  *(tal_lanes *)&b->spins[k] = v[2];
+  *(tal_lanes *)&b->speeds[k] = v[3];
 }
 
-// Whole groups of four.
-TAL_KERNEL void fetch(meetings *b, const tal_grain_record *record, const tal_places *at, int count, unsigned effects) {
+// Distances and normals: root and division take their time while other records are fetched.
+TAL_KERNEL void normals(meetings *b, const tal_lanes way[2], int k, tal_force_block *out) {
+  const tal_lanes distance = tal_lanes_root(way[0] * way[0] + way[1] * way[1]), inverse = 1 / distance;
+  *(tal_lanes *)&b->distance[k] = distance;
+  *(tal_lanes *)&out->x[k] = way[0] * inverse;
+  *(tal_lanes *)&out->y[k] = way[1] * inverse;
+}
+
+// Whole groups of four; of each the normals beside the next one's records.
+TAL_KERNEL void fetch(meetings *b, const tal_grain_record *record, const tal_seat *at, int count, tal_force_block *out,
+                      unsigned effects) {
+  tal_lanes way[2], before[2] = {{0}, {0}};
   for (int k = 0; k < count; k += 4) {
     const tal_grain_record *i[4], *j[4];
     for (int m = 0; m < 4; m++) {
-      i[m] = tal_at(record, at->i[k + m]);
-      j[m] = tal_at(record, at->j[k + m]);
+      i[m] = tal_at(record, at[k + m].i);
+      j[m] = tal_at(record, at[k + m].j);
     }
-    fetch_translation(b, i, j, k, effects);
+    fetch_first(b, i, j, k, way, effects);
     if (effects & TAL_EFFECT_SPRING)
-      fetch_middle(b, i, j, k);
-    if ((effects & TAL_EFFECT_SPIN) && (effects & TAL_EFFECT_FRICTION))
+      fetch_second(b, i, j, k);
+    else if (effects & TAL_EFFECT_SPIN && effects & TAL_EFFECT_FRICTION)
       fetch_spin(b, i, j, k);
+    if (k)
+      normals(b, before, k - 4, out);
+    before[0] = way[0];
+    before[1] = way[1];
   }
+  normals(b, before, (count - 1) & ~3, out);
 }
 
 TAL_KERNEL void rub(rubbing *r, const tal_sweep *sweep, int count, tal_force_block *out) {
@@ -112,7 +117,8 @@ TAL_KERNEL void rub(rubbing *r, const tal_sweep *sweep, int count, tal_force_blo
 
 TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep *sweep, size_t start, int count,
                          tal_force_block *out, unsigned effects) {
-  const double *restrict dx = b->dx, *restrict dy = b->dy, *restrict ux = b->ux, *restrict uy = b->uy;
+  const double *restrict distance = b->distance, *restrict nx = out->x, *restrict ny = out->y;
+  const double *restrict ux = b->ux, *restrict uy = b->uy;
   const double *restrict hx = b->hx, *restrict hy = b->hy, *restrict spins = b->spins, *restrict speeds = b->speeds;
   const double *restrict reach = slots->reach + start, *restrict stiffness = slots->stiffness + start;
   // one time for all contacts, as a scene with `damping` has it, saves an array
@@ -125,7 +131,7 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   double *spring_stiffness = past ? slots->spring_stiffness + start : unused[1];
   double *new_spring = sweep->moves ? spring : unused[0];
   double *new_spring_stiffness = sweep->moves ? spring_stiffness : unused[1];
-  double *restrict nx = out->x, *restrict ny = out->y, *restrict fe = out->elastic, *restrict fd = out->viscous;
+  double *restrict fe = out->elastic, *restrict fd = out->viscous;
   double *restrict ft = out->friction, *restrict half = out->half_overlap;
   const tal_law_constants constants = sweep->constants;
   const double friction = sweep->friction, dt = sweep->dt;
@@ -133,10 +139,8 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
   rubbing r;
 #pragma omp simd
   for (int k = 0; k < count; k++) {
-    double distance = sqrt(dx[k] * dx[k] + dy[k] * dy[k]);
-    double inverse = 1 / distance;
-    double x = dx[k] * inverse, y = dy[k] * inverse;
-    tal_meeting m = {.overlap = reach[k] - distance, .stiffness = stiffness[k], .friction = friction};
+    const double x = nx[k], y = ny[k];
+    tal_meeting m = {.overlap = reach[k] - distance[k], .stiffness = stiffness[k], .friction = friction};
     double half_overlap = 0.5 * m.overlap;
     if (effects & TAL_EFFECT_DAMPING) {
       m.damping = damping_scale * viscous[k];
@@ -149,8 +153,6 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
       m.spring_stiffness = spring_stiffness[k];
     }
     tal_law_force f = tal_contact_law(m, constants, at_once);
-    nx[k] = x;
-    ny[k] = y;
     fe[k] = f.fe;
     if (effects & TAL_EFFECT_DAMPING)
       fd[k] = f.fd;
@@ -170,10 +172,10 @@ TAL_KERNEL void work_out(const meetings *b, tal_contacts *slots, const tal_sweep
     rub(&r, sweep, count, out);
 }
 
-TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
+TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_seat *at,
                       size_t start, int count, tal_force_block *out, unsigned effects) {
   meetings b;
-  fetch(&b, record, at, count, effects);
+  fetch(&b, record, at, count, out, effects);
   work_out(&b, &sim->pairs, sweep, start, count, out, effects);
 }
 
@@ -184,7 +186,7 @@ TAL_KERNEL void block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_reco
   DAMPED_OR_NOT(mask) TURNS_OR_NOT((mask) | TAL_EFFECT_REGULARISED) TURNS_OR_NOT((mask) | TAL_EFFECT_SPRING)
 #define EVERY_VARIANT EACH_FRICTION(0) EACH_FRICTION(TAL_EFFECT_HERTZ)
 
-void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
+void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_seat *at,
                        size_t start, int count, tal_force_block *out) {
   // without friction it is nothing to a contact that grains turn
   switch (sweep->law & TAL_EFFECT_FRICTION ? sweep->law : sweep->law & ~(unsigned)TAL_EFFECT_SPIN) {

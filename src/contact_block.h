@@ -34,21 +34,14 @@ typedef struct tal_sweep {
   tal_law_constants constants;
 } tal_sweep;
 
-// Where the grains of a block of slots have their records: grain g's is the one at (g - origin) & mask, mask + 1 a
-// power of two. Rings of records and of sums have the same places.
-typedef struct tal_places {
-  uint32_t i[TAL_BLOCK], j[TAL_BLOCK]; // bytes from the first record
-} tal_places;
-
-static inline void *tal_at(const void *first, uint32_t place) {
-  return (char *)(uintptr_t)first + place;
+static inline void *tal_at(const void *first, uint32_t bytes) {
+  return (char *)(uintptr_t)first + bytes;
 }
 
 tal_sweep tal_sweep_of(const tal_sim *sim, double dt);
-// Of the slots [start, start + count), 0 < count <= TAL_BLOCK, and the last one's again for the rest of the block.
-void tal_places_of(const tal_contacts *slots, size_t start, int count, size_t origin, size_t mask, tal_places *places);
-// Forces of the grain-grain slots [start, start + count), count <= TAL_BLOCK, from the records at their places.
-void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_places *at,
+// Forces of the grain-grain slots [start, start + count), count <= TAL_BLOCK, from the records at their places, which
+// are read in whole fours.
+void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_seat *at,
                        size_t start, int count, tal_force_block *out);
 
 // Slip speed of i against j along t = (-ny, nx) with the lever arms r - d/2, eq (9): speeds is r_i w_i + r_j w_j, spins

@@ -73,9 +73,11 @@ static void sweep_pairs(tal_sim *sim, double dt) {
     int here = (int)(count - start < TAL_BLOCK ? count - start : TAL_BLOCK);
     tal_force_block b = {0};
     const size_t first = (size_t)sim->pairs.i[start];
-    tal_places at;
-    tal_places_of(&sim->pairs, start, here, first, UINT32_MAX, &at);
-    tal_contact_block(sim, &sweep, sim->grain_records + first, &at, start, here, &b);
+    tal_seat at[TAL_BLOCK] = {{0, 0}};
+    for (int k = 0; k < here; k++)
+      at[k] =
+          tal_seat_of((size_t)sim->pairs.i[start + (size_t)k] - first, (size_t)sim->pairs.j[start + (size_t)k] - first);
+    tal_contact_block(sim, &sweep, sim->grain_records + first, at, start, here, &b);
     keep_block(&b, sim->force_records + start, here, sweep.law);
   }
 }

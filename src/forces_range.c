@@ -127,7 +127,8 @@ static void ask(range *t, size_t slot) {
     return;
   slot += AHEAD_SLOTS;
   __builtin_prefetch(s->i + slot);
-  __builtin_prefetch(s->j + slot);
+  for (int line = 0; line < ASK_SLOTS; line += LINE)
+    __builtin_prefetch(t->sim->neighbours.seat + slot + line);
   for (int m = 0; m < t->of_slots.count; m++)
     for (int line = 0; line < ASK_SLOTS; line += LINE)
       __builtin_prefetch(t->of_slots.array[m] + slot + line, 1);
@@ -144,13 +145,12 @@ static void ask(range *t, size_t slot) {
 
 // ---- sums -----------------------------------------------------------------------------------------------------------
 
-TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block *b, int k, int count,
-                          unsigned effects) {
+TAL_KERNEL void add_group(range *t, const tal_seat *at, const tal_force_block *b, int k, int count, unsigned effects) {
   const tal_lanes signs = {-1, -1, 1, 1}; // on j the vectors change sign, the torque does not
   tal_lanes first[4], second[4];
   tal_force_block_turn(b, k, first, second, effects);
   for (int m = 0; m < count; m++) {
-    tal_force_halves *at_i = tal_at(t->sum, at->i[k + m]), *at_j = tal_at(t->sum, at->j[k + m]);
+    tal_force_halves *at_i = tal_at(t->sum, at[k + m].i), *at_j = tal_at(t->sum, at[k + m].j);
     at_i->first += first[m]; // stores to one line side by side: the other order costs a tenth of a step
     if (effects & TAL_EFFECT_FRICTION)
       at_i->second += second[m];
@@ -160,8 +160,7 @@ TAL_KERNEL void add_group(range *t, const tal_places *at, const tal_force_block 
   }
 }
 
-TAL_KERNEL void add(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count,
-                    unsigned effects) {
+TAL_KERNEL void add(range *t, const tal_seat *at, const tal_force_block *b, size_t start, int count, unsigned effects) {
   const int whole = count & ~3;
   for (int k = 0; k < whole; k += 4) {
     if (k % ASK_SLOTS == 0)
@@ -172,7 +171,7 @@ TAL_KERNEL void add(range *t, const tal_places *at, const tal_force_block *b, si
     add_group(t, at, b, whole, count - whole, effects);
 }
 
-static void add_block(range *t, const tal_places *at, const tal_force_block *b, size_t start, int count) {
+static void add_block(range *t, const tal_seat *at, const tal_force_block *b, size_t start, int count) {
   const bool friction = t->sweep.law & TAL_EFFECT_FRICTION, damping = t->sweep.law & TAL_EFFECT_DAMPING;
   if (friction && damping)
     add(t, at, b, start, count, TAL_EFFECT_FRICTION | TAL_EFFECT_DAMPING);
@@ -232,16 +231,15 @@ static size_t slot_of(const tal_contacts *slots, size_t grain) {
 // All slots whose i lies in [t->done, last).
 static void work_off(range *t, size_t last) {
   const tal_contacts *slots = &t->sim->pairs;
+  const tal_seat *seat = t->sim->neighbours.seat;
   const size_t end = slot_of(slots, last);
   for (size_t start = slot_of(slots, t->done); start < end; start += TAL_BLOCK) {
     int count = (int)(end - start < TAL_BLOCK ? end - start : TAL_BLOCK);
     tal_force_block b;
-    tal_places at;
     complete(t, (size_t)slots->i[start], false);
     see(t, (size_t)slots->i[start + (size_t)count - 1] + t->sim->neighbours.span + 1);
-    tal_places_of(slots, start, count, 0, t->mask, &at);
-    tal_contact_block(t->sim, &t->sweep, t->record, &at, start, count, &b);
-    add_block(t, &at, &b, start, count);
+    tal_contact_block(t->sim, &t->sweep, t->record, seat + start, start, count, &b);
+    add_block(t, seat + start, &b, start, count);
   }
   complete(t, last, true);
 }

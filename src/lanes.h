@@ -5,6 +5,7 @@
 
 #include "effects.h"
 
+#include <math.h>
 #include <stdint.h>
 
 // Contacts that the implicit scheme takes at a time.
@@ -25,6 +26,13 @@ TAL_KERNEL void tal_lanes_turn(tal_lanes v[4]) {
   v[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
   v[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
   v[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+TAL_KERNEL tal_lanes tal_lanes_root(tal_lanes x) {
+  tal_lanes root;
+  for (int m = 0; m < 4; m++)
+    root[m] = sqrt(x[m]);
+  return root;
 }
 
 // Squares of speeds as bits, which order like the numbers, NAN above all: of each lane the largest so far.

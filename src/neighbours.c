@@ -22,6 +22,7 @@ void tal_neighbours_clear(tal_neighbours *neighbours) {
   free(neighbours->first);
   free(neighbours->slot);
   free(neighbours->wall_first);
+  free(neighbours->seat);
   *neighbours = (tal_neighbours){0};
 }
 
@@ -83,6 +84,7 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots, bool sol
 // handfuls at both ends.
 static void measure_ring(tal_sim *sim) {
   const tal_contacts *slots = &sim->pairs;
+  tal_neighbours *n = &sim->neighbours;
   const size_t block = TAL_BLOCK, waiting = TAL_BLOCK;
   size_t span = 0, length = 0;
   for (size_t c = 0; c < slots->count; c++) {
@@ -90,10 +92,15 @@ static void measure_ring(tal_sim *sim) {
     span = (size_t)slots->j[c] - i > span ? (size_t)slots->j[c] - i : span;
     length = i - first > length ? i - first : length;
   }
-  sim->neighbours.span = span;
-  sim->neighbours.ring = 1;
-  while (sim->neighbours.ring < length + span + 1 + 2 * waiting)
-    sim->neighbours.ring *= 2;
+  n->span = span;
+  n->ring = 1;
+  while (n->ring < length + span + 1 + 2 * waiting)
+    n->ring *= 2;
+  const size_t mask = n->ring - 1;
+  free(n->seat);
+  n->seat = tal_alloc(slots->count + 3, sizeof *n->seat);
+  for (size_t c = 0; c < slots->count; c++)
+    n->seat[c] = tal_seat_of((size_t)slots->i[c] & mask, (size_t)slots->j[c] & mask);
 }
 
 // Pairs that are looked through before the bucket grid is searched again: as far as is worth it, and no further than

@@ -3,6 +3,7 @@
 #define TAL_NEIGHBOURS_H
 
 #include "cells.h"
+#include "records.h"
 #include <stdbool.h>
 
 struct tal_sim;
@@ -16,11 +17,12 @@ typedef struct tal_neighbours {
   int32_t *slot;       // owned; [2 pairs] slot index c; where the grain is the slot's j: ~c
   int32_t *wall_first; // owned; [n + 1] the same for wall contacts; only meaningful when there are any
   size_t grain_capacity;
-  size_t span;   // largest j - i of the slots
-  size_t ring;   // grains that the hot loop must hold at a time, a power of two
-  double moved;  // [m] no grain has moved further than this since the list was built
-  double stride; // [m] no grain moved further than this in the last step
-  int unseen;    // steps since the displacements were looked at
+  size_t span;    // largest j - i of the slots
+  size_t ring;    // grains that the hot loop must hold at a time, a power of two
+  tal_seat *seat; // owned; [slots, and three more] of each slot's grains in such a ring
+  double moved;   // [m] no grain has moved further than this since the list was built
+  double stride;  // [m] no grain moved further than this in the last step
+  int unseen;     // steps since the displacements were looked at
   uint64_t rebuilds;
 } tal_neighbours;
 

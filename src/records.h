@@ -5,6 +5,9 @@
 #ifndef TAL_RECORDS_H
 #define TAL_RECORDS_H
 
+#include <stddef.h>
+#include <stdint.h>
+
 // One grain as the contact laws see it.
 typedef struct tal_grain_record {
   double x, y;   // [m] centre
@@ -22,6 +25,15 @@ typedef struct tal_force_record {
   double ft;                     // [N] tangential force along t
   double ft_half_overlap;        // [N m] ft d/2: the torque on either grain is ft d/2 - ft r
 } __attribute__((aligned(64))) tal_force_record;
+
+// Where two grains that meet have their records, and in a ring of sums their sums.
+typedef struct tal_seat {
+  uint32_t i, j; // [bytes] from the first
+} tal_seat;
+
+static inline tal_seat tal_seat_of(size_t i, size_t j) {
+  return (tal_seat){(uint32_t)(i * sizeof(tal_grain_record)), (uint32_t)(j * sizeof(tal_grain_record))};
+}
 
 // Powers of forces on the grains of one kick [W].
 typedef struct tal_kick_powers {

@@ -6,7 +6,6 @@
 
 #define tal_contact_block TAL_WIDE(tal_contact_block)
 #define tal_sweep_of      TAL_WIDE(tal_sweep_of)
-#define tal_places_of     TAL_WIDE(tal_places_of)
 #define tal_kick          TAL_WIDE(tal_kick)
 #define tal_kick_book     TAL_WIDE(tal_kick_book)
 #define tal_forces_range  TAL_WIDE(tal_forces_range)
