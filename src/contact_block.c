@@ -1,5 +1,5 @@
-// A block goes through loops of its own: one fetches the records of the grains, four contacts at a time, turns them into
-// arrays and works out the normals; a vector loop works out the law with selects in place of branches; regularised
+// A block goes through loops of its own: one fetches the records of the grains, four contacts at a time, turns them
+// into arrays and works out the normals; a vector loop works out the law with selects in place of branches; regularised
 // friction, whose root is a chain of operations as long as all the rest, is put on by two more.
 #include "contact_block.h"
 
