@@ -74,7 +74,9 @@ TAL_KERNEL void fetch_second(meetings *b, const tal_grain_record *const i[4], co
 
 // Distances and normals: root and division take their time while other records are fetched.
 TAL_KERNEL void normals(meetings *b, const tal_lanes way[2], int k, tal_force_block *out) {
-  const tal_lanes distance = tal_lanes_root(way[0] * way[0] + way[1] * way[1]), inverse = 1 / distance;
+  tal_lanes distance = way[0] * way[0] + way[1] * way[1];
+  tal_lanes_root(&distance);
+  const tal_lanes inverse = 1 / distance;
   *(tal_lanes *)&b->distance[k] = distance;
   *(tal_lanes *)&out->x[k] = way[0] * inverse;
   *(tal_lanes *)&out->y[k] = way[1] * inverse;

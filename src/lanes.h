@@ -28,11 +28,9 @@ TAL_KERNEL void tal_lanes_turn(tal_lanes v[4]) {
   v[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
 }
 
-TAL_KERNEL tal_lanes tal_lanes_root(tal_lanes x) {
-  tal_lanes root;
+TAL_KERNEL void tal_lanes_root(tal_lanes *x) {
   for (int m = 0; m < 4; m++)
-    root[m] = sqrt(x[m]);
-  return root;
+    (*x)[m] = sqrt((*x)[m]);
 }
 
 // Squares of speeds as bits, which order like the numbers, NAN above all: of each lane the largest so far.
