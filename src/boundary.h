@@ -14,7 +14,7 @@ struct tal_boundary {
   void (*refreshed)(tal_sim *sim); // the graph is new: settle where on the loop to act
   void (*apply)(tal_sim *sim);     // forces bx, by for the present centres [N]
   // The same for grains [from, to) alone and the centres in sim->loop_centre, where nothing else is asked for: threads
-  // press their own grains. NULL: it asks for more.
+  // press their own grains. NULL: it asks for more, or it acts on others than the loop's grains.
   void (*press)(tal_sim *sim, size_t from, size_t to);
   void (*start)(tal_sim *sim); // velocities with which the stage begins; NULL: those there are
   // Bodies of its own move with the grains: first and second half of a step, eqs (12)-(15). NULL: it has none.
@@ -37,7 +37,7 @@ struct tal_boundary {
 
 const tal_boundary *tal_boundary_find(const char *name);
 // Where the boundary has come to act on other grains: no force on those of before, which keep their last one until the
-// forces are evaluated anew.
+// forces are evaluated anew; sim->pressed says where there may be any from now on.
 void tal_boundary_let_go(tal_sim *sim);
 // Before `press`: room for the centres of the loop, and no force on grains that have left it.
 void tal_boundary_prepare(tal_sim *sim);

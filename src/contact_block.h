@@ -39,8 +39,8 @@ static inline void *tal_at(const void *first, uint32_t bytes) {
 }
 
 tal_sweep tal_sweep_of(const tal_sim *sim, double dt);
-// Forces of the grain-grain slots [start, start + count), count <= TAL_BLOCK, from the records at their places, which
-// are read in whole fours.
+// Forces of the grain-grain slots [start, start + count), 0 < count <= TAL_BLOCK, from the records at their seats,
+// which are read in whole fours.
 void tal_contact_block(tal_sim *sim, const tal_sweep *sweep, const tal_grain_record *record, const tal_seat *at,
                        size_t start, int count, tal_force_block *out);
 

@@ -9,8 +9,8 @@
 enum { TAL_DRIFT_GRAINS = 64 };
 
 // First half kick, drift, prediction of the grains [start, start + count), count <= TAL_DRIFT_GRAINS, by dt [s], eqs
-// (12)-(14), and their records where `record` is not NULL. Where it is, returns the square of the largest speed
-// [m^2/s^2] as bits, which order like the numbers, NAN above all; else 0: whoever asks for records knows from the kick.
+// (12)-(14), and their records where `record` is not NULL. Without records returns the square of the largest speed
+// [m^2/s^2] as bits, which order like the numbers, NAN above all; else 0: who asks for records has it from the kick.
 // Where sim->remembers, what the laws are going to see is left in ux, uy, spin too. Here and below start is a multiple
 // of four, and records are written up to the next multiple of four.
 int64_t tal_drift_group(tal_sim *sim, size_t start, int count, double dt, tal_grain_record *record);

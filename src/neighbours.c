@@ -82,7 +82,7 @@ static void carry_springs(const tal_contacts *old, tal_contacts *slots, bool sol
 
 // A ring holds all grains from the first that is not yet complete to the last partner that a block may have, and
 // handfuls at both ends.
-static void measure_ring(tal_sim *sim) {
+static void lay_ring(tal_sim *sim) {
   const tal_contacts *slots = &sim->pairs;
   tal_neighbours *n = &sim->neighbours;
   const size_t block = TAL_BLOCK, waiting = TAL_BLOCK;
@@ -96,6 +96,11 @@ static void measure_ring(tal_sim *sim) {
   n->ring = 1;
   while (n->ring < length + span + 1 + 2 * waiting)
     n->ring *= 2;
+}
+
+static void seat_slots(tal_sim *sim) {
+  const tal_contacts *slots = &sim->pairs;
+  tal_neighbours *n = &sim->neighbours;
   const size_t mask = n->ring - 1;
   free(n->seat);
   n->seat = tal_alloc(slots->count + 3, sizeof *n->seat);
@@ -167,7 +172,8 @@ static void list_pairs(tal_sim *sim) {
   tal_contacts_swap(&sim->pairs, &fresh);
   tal_contacts_clear(&fresh);
   geo_pairs_clear(pairs);
-  measure_ring(sim);
+  lay_ring(sim);
+  seat_slots(sim);
 }
 
 // Elastic energy [J] of a grain on a wall `back` seconds before the end of this step's drift.

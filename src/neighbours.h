@@ -19,7 +19,7 @@ typedef struct tal_neighbours {
   size_t grain_capacity;
   size_t span;    // largest j - i of the slots
   size_t ring;    // grains that the hot loop must hold at a time, a power of two
-  tal_seat *seat; // owned; [slots, and three more] of each slot's grains in such a ring
+  tal_seat *seat; // owned; [slots + 3] of each slot's grains in such a ring; zeros behind: they are read in fours
   double moved;   // [m] no grain has moved further than this since the list was built
   double stride;  // [m] no grain moved further than this in the last step
   int unseen;     // steps since the displacements were looked at

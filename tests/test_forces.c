@@ -10,6 +10,7 @@
 #include "engine.h"
 #include "forces.h"
 #include "integrate.h"
+#include "kick.h"
 #include "walls_load.h"
 #include <omp.h>
 
@@ -198,9 +199,52 @@ static void one_pass_or_two(void **state) {
     }
 }
 
+static size_t handfuls_pressed(const tal_sim *sim) {
+  size_t count = 0;
+  for (size_t i = 0; i < sim->grains.count; i++)
+    if (sim->grains.bx[i] != 0 || sim->grains.by[i] != 0)
+      assert_true(sim->pressed[i / TAL_KICK_GRAINS]);
+  for (size_t k = 0; k <= sim->grains.count / TAL_KICK_GRAINS; k++)
+    count += sim->pressed[k];
+  return count;
+}
+
+// EXACT: boundary forces are read where the boundary acts only; to read them everywhere is the same. Rows of grains are
+// longer than a handful, so that there are handfuls inside; refreshes of the graph, and a stage without a boundary
+// between two with one.
+static void boundary_forces_where_there_are_some(void **state) {
+  (void)state;
+  engine *e[2];
+  size_t least = SIZE_MAX;
+  for (int m = 0; m < 2; m++) {
+    draft *d = draft_begin();
+    fputs("grains: {radius: {law: uniform, min: 0.75e-3, max: 0.75e-3}, thickness: 1.5e-3}\n"
+          "pack: {method: lattice, columns: 200, rows: 9, gap: -2e-6}\nmass_scaling: 1e5\ncontinuum: {refresh: 20}\n"
+          "material: {young: 30e9, poisson: 0.3, density: 2675, friction: 0.4}\ncontact: {tangential: spring}\n"
+          "integrator: {dt: 1e-5}\nstages: [{kind: compress, pressure: 100e3, rate: 0.5, strain: 1e-3},\n"
+          "  {kind: free, duration: 0.5e-3}, {kind: compress, pressure: 50e3, rate: 0.5, strain: 2e-3}]\n",
+          d->to);
+    e[m] = engine_start(d);
+  }
+  for (int s = 0; s < 400; s++) {
+    tal_error err;
+    assert_int_equal(tal_sim_step(e[0]->sim, &err), TAL_OK);
+    memset(e[1]->sim->pressed, 1, e[1]->sim->grains.count / TAL_KICK_GRAINS + 1);
+    assert_int_equal(tal_sim_step(e[1]->sim, &err), TAL_OK);
+    assert_same_arrays(e[0], e[1], "pressed");
+    const size_t pressed = handfuls_pressed(e[0]->sim);
+    least = pressed < least ? pressed : least;
+  }
+  assert_int_equal(e[0]->sim->run.stage, 2);
+  assert_in_range(least, 10, 20); // of 29
+  engine_end(e[0]);
+  engine_end(e[1]);
+}
+
 int main(void) {
   omp_set_num_threads(1);
   const struct CMUnitTest tests[] = {cmocka_unit_test(same_bits_as_the_plain_way), cmocka_unit_test(one_pass_or_two),
+                                     cmocka_unit_test(boundary_forces_where_there_are_some),
                                      cmocka_unit_test(lonely_grains)};
   return cmocka_run_group_tests(tests, NULL, NULL);
 }
